@@ -1,0 +1,1 @@
+"""Where documents lie on disk."""

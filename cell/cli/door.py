@@ -1,0 +1,63 @@
+"""The command `cell`: its commands, and the one place where errors become exit codes."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from typing import Any
+
+import typer
+
+from cell import __version__
+from cell.cli.words import console, print_json
+from cell.core.errors import BUG, INTERRUPTED, CellError
+
+app = typer.Typer(
+    name="cell",
+    help="Robot-guided optical inspection of car bodies.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="markdown",
+    pretty_exceptions_enable=False,
+)
+
+WRONG_WORDS: Any = typer.BadParameter.__mro__[2]  # the base of usage errors, wherever click lives
+REASONS = {2: "bad_input", 3: "device_fault", 4: "recording_failed"}
+
+
+@app.callback(invoke_without_command=True)
+def _cell(version: bool = typer.Option(False, "--version", help="Print the version.")) -> None:
+    if version:
+        print(f"cell {__version__}")
+        raise typer.Exit
+
+
+def main() -> None:
+    """Run one command and leave with its exit code."""
+    sys.exit(_run())
+
+
+def _run() -> int:
+    try:
+        return app(standalone_mode=False) or 0
+    except typer.Exit as leave:
+        return leave.exit_code
+    except (KeyboardInterrupt, typer.Abort):
+        console.print("interrupted", style="yellow")
+        return INTERRUPTED
+    except WRONG_WORDS as wrong:
+        wrong.show()
+        return wrong.exit_code
+    except CellError as error:
+        return _explain(error)
+    except Exception:  # noqa: BLE001  a bug must never end with a code that reads as a verdict
+        traceback.print_exc()
+        console.print("This is a fault of the program, not of your input.", style="red")
+        return BUG
+
+
+def _explain(error: CellError) -> int:
+    if "--json" in sys.argv:
+        print_json({"ok": False, "reason": REASONS[error.exit_code], "detail": str(error)})
+    console.print(f"[red]error:[/red] {error}", highlight=False, soft_wrap=True)
+    return error.exit_code

@@ -1,0 +1,1 @@
+"""What every floor above speaks: geometry, optics, kinematics, documents, ports, errors."""

@@ -1,0 +1,99 @@
+"""The camera and the sensor: how points in front of the lens become pixels, and back.
+
+Model: pinhole with the Brown-Conrady distortion of OpenCV (k1, k2, p1, p2, k3). Pixel centres lie
+at integers, (x, y) with x to the right and y down; the camera frame has z forward.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cell.core.geometry import Array, Plane
+
+NEWTON_STEPS = 6  # quadratic: four suffice for the lenses met, two are for the others
+
+
+@dataclass(frozen=True, eq=False)
+class CameraModel:
+    """A calibrated camera: image size (width, height), 3x3 matrix in px, distortion (5,)."""
+
+    image_size: tuple[int, int]
+    matrix: Array
+    distortion: Array
+
+    def project(self, points_in_camera: ArrayLike) -> Array:
+        """Project points (..., 3) in mm to pixels (..., 2), distortion included."""
+        points = np.asarray(points_in_camera, dtype=np.float64)
+        normalised = points[..., :2] / points[..., 2:]
+        return self.to_pixels(normalised)
+
+    def to_pixels(self, normalised: ArrayLike) -> Array:
+        """Distort normalised coordinates (..., 2) and turn them into pixels (..., 2)."""
+        x, y = np.moveaxis(np.asarray(normalised, dtype=np.float64), -1, 0)
+        x_d, y_d, *_ = _distort(x, y, self.distortion)
+        k = self.matrix
+        return np.stack([k[0, 0] * x_d + k[0, 1] * y_d + k[0, 2], k[1, 1] * y_d + k[1, 2]], axis=-1)
+
+    def normalise(self, pixels: ArrayLike) -> Array:
+        """Undistort pixels (..., 2) to normalised coordinates (..., 2): the ray is (x, y, 1).
+
+        Newton's iteration from the pinhole's answer; OpenCV's function differs by version.
+        """
+        k = self.matrix
+        u, v = np.moveaxis(np.asarray(pixels, dtype=np.float64), -1, 0)
+        y_d = (v - k[1, 2]) / k[1, 1]
+        x_d = (u - k[0, 2] - k[0, 1] * y_d) / k[0, 0]
+        x, y = x_d, y_d
+        for _ in range(NEWTON_STEPS):
+            f, g, f_x, f_y, g_x, g_y = _distort(x, y, self.distortion)
+            f, g, determinant = f - x_d, g - y_d, f_x * g_y - f_y * g_x
+            x = x - (g_y * f - f_y * g) / determinant
+            y = y - (f_x * g - g_x * f) / determinant
+        return np.stack([x, y], axis=-1)
+
+    def rays(self, pixels: ArrayLike) -> Array:
+        """Undistort pixels (..., 2) to rays (..., 3) with z = 1."""
+        normalised = self.normalise(pixels)
+        return np.concatenate([normalised, np.ones((*normalised.shape[:-1], 1))], axis=-1)
+
+
+def _distort(x: Array, y: Array, distortion: Array) -> tuple[Array, ...]:
+    """Apply the Brown-Conrady model: (x_d, y_d) and dx_d/dx, dx_d/dy, dy_d/dx, dy_d/dy."""
+    k1, k2, p1, p2, k3 = distortion
+    r2 = x * x + y * y
+    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    slope = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3))
+    cross = slope * x * y + 2.0 * (p1 * x + p2 * y)
+    return (x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
+            radial + slope * x * x + 2.0 * p1 * y + 6.0 * p2 * x,
+            cross,
+            cross,
+            radial + slope * y * y + 6.0 * p1 * y + 2.0 * p2 * x)
+
+
+@dataclass(frozen=True, eq=False)
+class SensorModel:
+    """The structured-light sensor: a camera and the light plane in the camera frame (mm).
+
+    `camera_covariance` (9, 9) is that of fx, fy, cx, cy, k1, k2, p1, p2, k3, and
+    `light_plane_covariance` (4, 4) that of the unit normal and the offset; None counts as exact.
+    """
+
+    camera: CameraModel
+    light_plane: Plane
+    camera_covariance: Array | None = None
+    light_plane_covariance: Array | None = None
+
+    @property
+    def working_distance(self) -> float:
+        """L in mm: z where the optic axis meets the light plane (paper, section 5.2)."""
+        return -self.light_plane.offset / float(self.light_plane.normal[2])
+
+    @property
+    def triangulation_angle(self) -> float:
+        """alpha in rad: the angle between optic axis and light plane (paper, section 5.1)."""
+        return float(np.arcsin(abs(self.light_plane.normal[2])))

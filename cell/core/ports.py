@@ -1,0 +1,127 @@
+"""What a program asks of the outside. Real and simulated devices answer alike.
+
+House units: mm, rad, s. A device raises `DeviceError` for anything that is not an answer; a
+`CameraTimeoutError` can be retried at the same pose, since the robot stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, TypeAlias
+
+from cell.core.errors import DeviceError
+from cell.core.geometry import Transform
+from cell.core.observation import Image, Light
+
+Joints: TypeAlias = tuple[float, ...]
+
+
+class CameraTimeoutError(DeviceError):
+    """Report that no image came in time. The camera has been re-armed: no late image can follow."""
+
+
+class RobotStoppedError(DeviceError):
+    """Report that the robot's own safety or a person stopped it. `state` is a short code.
+
+    One of `protective_stop`, `safeguard_stop`, `emergency_stop`, `local_mode`, `paused`, `lost`.
+    """
+
+    def __init__(self, message: str, *, state: str, device: str | None = "robot") -> None:
+        self.state = state
+        super().__init__(message, device=device)
+
+
+@dataclass(frozen=True)
+class RobotIdentity:
+    """Who the controller says it is, as read: the calibration set must agree with it."""
+
+    model: str
+    serial: str
+    software: str
+    kinematics_checksum: str
+    payload_kg: float
+    tcp_offset: tuple[float, ...]  # x, y, z in mm and the rotation vector in rad
+
+
+@dataclass(frozen=True, eq=False)
+class RobotState:
+    """Where the arm stands, as the controller reports it: `base_from_flange`, never the TCP."""
+
+    base_from_flange: Transform
+    joints: Joints
+    controller_time: float
+    still: bool
+    temperatures: tuple[float, ...] = ()  # joints, degrees C
+
+
+@dataclass(frozen=True)
+class Move:
+    """One joint move. `speed` rad/s and `acceleration` rad/s² hold for the leading joint."""
+
+    joints: Joints
+    speed: float
+    acceleration: float
+
+
+class Robot(Protocol):
+    """An arm that goes where it is told and says where it really is."""
+
+    def open(self) -> RobotIdentity:
+        """Connect, check that it may move (mode, safety, remote control), say who it is."""
+
+    def move_to(self, path: Sequence[Move]) -> RobotState:
+        """Go through joint moves in order and return the state reached, verified at rest."""
+
+    def state(self) -> RobotState:
+        """Read the state, no older than a few controller cycles."""
+
+    def stop(self) -> None:
+        """Bring the arm to rest, bounded in time. Never raises."""
+
+    def close(self) -> None:
+        """Stop, release the controller, bounded in time. Idempotent, never raises."""
+
+
+class Lights(Protocol):
+    """The ring light and the laser. The laser burns only between `set("laser")` and `off()`."""
+
+    def set(self, light: Light | None) -> None:
+        """Switch exactly this light on and the other off, and wait until read back and risen."""
+
+    def off(self) -> None:
+        """Switch both off. Never raises: it is called on every way out."""
+
+
+class Camera(Protocol):
+    """A camera that takes one image when told, exposed after it was told."""
+
+    def open(self) -> tuple[int, int]:
+        """Connect and arm; return the image size (width, height)."""
+
+    def snap(self, exposure: float) -> Image:
+        """Expose once for `exposure` seconds and return the image of this very exposure.
+
+        Raises:
+            CameraTimeoutError: no image in time; re-armed.
+            DeviceError: lost, or the image has the wrong size.
+        """
+
+    def close(self) -> None:
+        """Release the device, bounded in time. Idempotent, never raises."""
+
+
+class Operator(Protocol):
+    """A person at the cell: asked, told, and shown things."""
+
+    def tell(self, message: str) -> None:
+        """Say something that needs no answer."""
+
+    def confirm(self, question: str) -> bool:
+        """Ask for a yes or a no."""
+
+    def choose(self, question: str, options: Sequence[str]) -> str:
+        """Ask for one of `options`."""
+
+    def ask(self, question: str, default: str | None = None) -> str:
+        """Ask for a line of text."""

@@ -1,0 +1,1 @@
+"""Real devices behind the ports of `core.ports`; vendor errors and units stop here."""

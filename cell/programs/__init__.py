@@ -1,0 +1,1 @@
+"""What the cell does: programs over ports and documents."""

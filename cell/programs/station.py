@@ -1,0 +1,1 @@
+"""The station: the only place that chooses between real and simulated devices."""

@@ -1,0 +1,1 @@
+"""Recordings: written, read, sealed and shown. The only room that imports rerun."""
