@@ -72,7 +72,7 @@ def test_the_matrix_is_kept_to_the_bit_and_cannot_be_changed() -> None:
 def test_rays_meet_the_plane_on_the_plane(normal: np.ndarray, point: np.ndarray,
                                           rays: np.ndarray) -> None:
     plane = Plane.through(point, normal)
-    directions = rays + [0.0, 0.0, 1.0]
+    directions = np.add(rays, [0.0, 0.0, 1.0])
     slanted = np.abs(directions @ plane.normal) > 1e-2
     met = plane.meet(directions[slanted])
     assert plane.distance(met) == pytest.approx(0.0, abs=1e-6)

@@ -16,7 +16,9 @@ class Located:
 
     `covariance` (4, 4) of x, y, z and the radius; `normal` (3,) unit, towards the camera, None
     where the method does not estimate one. `budget` maps each source of uncertainty to its share
-    (standard, x y z radius); `quality` holds what the gates looked at.
+    (standard, x y z radius); `quality` holds what the gates looked at. `trace` is for the eye, in
+    raw pixels: `rim` (n, 2), `ellipse` (k, 2) closed, `stripe` (m, 2), `chord` (2, 2) the points A
+    and B, `q` (2,), `centre` (2,).
     """
 
     method: str
