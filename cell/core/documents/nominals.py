@@ -17,11 +17,11 @@ AXES = ("x", "y", "z", "d")
 class Hole:
     """One hole as a plan knows it.
 
-    `nominal` maps each axis of `control` to its nominal (mm); `tolerance` to its half width (mm).
-    `centre` (3,) is the full nominal position, wherever controlled or not, on the face that the
-    coordinates lie on, with outward `normal` (3,); `thickness` mm of sheet; `side` says whether
-    that face is the one the camera sees. `cmm` and `cmm_u` are what a CMM measured on the master
-    body (not the drawing's nominal), by axis.
+    `tolerance` maps each axis of `control` to its half width (mm). `centre` (3,) is the full
+    nominal position, controlled or not, on the face that the coordinates lie on, with outward
+    `normal` (3,); `thickness` mm of sheet; `side` says whether that face is the one the camera
+    sees. `cmm` and `cmm_u` are what a CMM measured on the master body (not the drawing's nominal),
+    by axis.
     """
 
     id: str
@@ -35,6 +35,12 @@ class Hole:
     importance: str = ""
     cmm: dict[str, float] | None = None
     cmm_u: float | None = None
+
+    @property
+    def nominal(self) -> dict[str, float]:
+        """The nominal of each axis of `control` in mm."""
+        values = dict(zip(AXES, (*map(float, self.centre), self.diameter), strict=True))
+        return {axis: values[axis] for axis in AXES if axis in self.control}
 
     @property
     def radius(self) -> float:
