@@ -9,6 +9,7 @@ from typing import Any
 import typer
 
 from cell import __version__
+from cell.cli.study import study_app
 from cell.cli.words import console, print_json
 from cell.core.errors import BUG, INTERRUPTED, CellError
 
@@ -23,6 +24,8 @@ app = typer.Typer(
 
 WRONG_WORDS: Any = typer.BadParameter.__mro__[2]  # the base of usage errors, wherever click lives
 REASONS = {2: "bad_input", 3: "device_fault", 4: "recording_failed"}
+
+app.add_typer(study_app)
 
 
 @app.callback(invoke_without_command=True)
