@@ -22,7 +22,8 @@ study_app = typer.Typer(
     help="""Study the measuring system from tables of measured values.
 
 FILE: CSV with a column `id`, some of `x,y,z,d` in mm, and where known `approach` (the robot
-left and came back), `location` (the body was taken out and put back) and `part`. Ends with 0 where every
+left and came back), `location` (the body was taken out and put back) and `part`.
+Ends with 0 where every
 index was reached, 1 where one was missed or refused, 2 where a table cannot be read.""")
 
 FILES = typer.Argument(..., metavar="FILE…", help="Tables of measured values.")

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias
+from typing import Literal, Protocol, TypeAlias
 
+from cell.core.documents.result import Outcome
 from cell.core.errors import DeviceError
 from cell.core.geometry import Transform
 from cell.core.observation import Image, Light
@@ -125,3 +126,110 @@ class Operator(Protocol):
 
     def ask(self, question: str, default: str | None = None) -> str:
         """Ask for a line of text."""
+
+
+class Supervisor(Protocol):
+    """Who stands above a run of one body, told of each hole and asked what to do.
+
+    `cell run` needs none; a shift's supervisor knows the takt, the line and the operator.
+    """
+
+    def hole_done(self, index: int, count: int, outcome: Outcome) -> None:
+        """Hear of hole `index` (from 0) of `count`, as it was measured or not."""
+
+    def next_hole(self, remaining: Sequence[str]) -> str | None:
+        """Give the reason why `remaining[0]` is to be skipped, or None to measure it.
+
+        Raises:
+            DeviceError: the body is to be left here (`k` holes refused in a row, a missing datum).
+            KeyboardInterrupt: the line or the operator aborts the body.
+        """
+
+    def may_resume(self, error: DeviceError) -> bool:
+        """Ask a person whether the body goes on at the hole where `error` stopped it.
+
+        Called with the robot at rest and the lights off; blocks until somebody has answered. True
+        says that the cause is gone and that the body has not moved.
+        """
+
+
+LineVerdict: TypeAlias = Literal["ok", "nok", "uncertain", "incomplete"]
+Command: TypeAlias = Literal["start", "abort", "reset", "bypass", "end_bypass", "stop"]
+
+
+@dataclass(frozen=True)
+class Order:
+    """A command of the line, taken at its rising edge. A start names the body and its type; a
+    bypass says who wants it (`operator`) and why (`reason`), in the line's own numbers or words.
+    """
+
+    command: Command
+    body_id: str = ""
+    body_type: int = 0
+    operator: str = ""
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class LineStatus:
+    """What the cell says of itself at any time. `hole` of `holes` is the progress; `fault` is 0 or
+    a code of the fault table. `clear`: the arm stands outside of the body's way.
+    """
+
+    state: str
+    ready: bool = False
+    busy: bool = False
+    clear: bool = True
+    master_due: bool = False
+    bypass: bool = False
+    trial: bool = False
+    fault: int = 0
+    hole: int = 0
+    holes: int = 0
+    seconds_left: int = 0
+
+
+@dataclass(frozen=True)
+class LineResult:
+    """What the line is told of one body: it belongs to `sequence` and `body_id` and nothing else.
+
+    `worst` is the largest deviation in mm, None where nothing was measured.
+    """
+
+    sequence: int
+    body_id: str
+    body_type: int
+    verdict: LineVerdict
+    measured: int
+    out_of_tolerance: int
+    missing: int
+    worst: float | None
+    trial: bool = True
+
+
+class Line(Protocol):
+    """What brings bodies and takes verdicts away: a PLC, or a person in its place."""
+
+    def open(self) -> None:
+        """Begin to listen. Raises `DeviceError` where the address cannot be used."""
+
+    def show(self, status: LineStatus) -> None:
+        """Say what the cell is doing. Never blocks."""
+
+    def take(self, timeout: float) -> Order | None:
+        """Wait for the next command, at its edge, for at most `timeout` seconds."""
+
+    def answer(self, order: Order, refusal: int = 0) -> None:
+        """Echo a command: accepted, or refused with a code of the fault table."""
+
+    def publish(self, result: LineResult) -> None:
+        """Show a result and hold it until it is acknowledged."""
+
+    def acknowledged(self, sequence: int) -> bool:
+        """Tell whether the result `sequence` has been acknowledged."""
+
+    def alive(self) -> bool:
+        """Tell whether the other side's heartbeat beats."""
+
+    def close(self) -> None:
+        """Stop listening. Idempotent, never raises."""

@@ -115,7 +115,8 @@ def test_type3_refuses_what_cannot_be_split(table, words):
 
 
 def _nested(chance, sds, shape):
-    table = (chance.normal(0, sds[2], (*shape[:1], 1, 1)) + chance.normal(0, sds[1], (*shape[:2], 1))
+    table = (chance.normal(0, sds[2], (*shape[:1], 1, 1))
+             + chance.normal(0, sds[1], (*shape[:2], 1))
              + chance.normal(0, sds[0], shape))
     labels = np.indices(shape)
     return (817.3 + table.ravel(), [f"a{k}" for k in labels[1].ravel()],
