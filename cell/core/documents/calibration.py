@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated, TypeAlias
 
 import numpy as np
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
 from cell.core.documents.base import Document, Matrix3, Matrix4, Number, Vector4, Vector6
 from cell.core.geometry import Array, Plane, Transform
 from cell.core.optics import CameraModel, SensorModel
+
+Pixels = Annotated[int, Field(ge=16, le=20_000)]
+Covariance: TypeAlias = tuple[tuple[Number, ...], ...]
 
 
 class SensorDocument(Document):
@@ -20,13 +25,35 @@ class SensorDocument(Document):
     to a unit normal.
     """
 
-    image_size: tuple[int, int]
+    image_size: tuple[Pixels, Pixels]
     camera_matrix: Matrix3
     distortion: tuple[Number, Number, Number, Number, Number]
     light_plane: Vector4
-    camera_covariance: tuple[tuple[Number, ...], ...] | None = None
-    light_plane_covariance: tuple[tuple[Number, ...], ...] | None = None
+    camera_covariance: Covariance | None = None
+    light_plane_covariance: Covariance | None = None
     serial: str | None = None
+
+    @field_validator("camera_matrix")
+    @classmethod
+    def _is_a_camera(cls, rows: Matrix3) -> Matrix3:
+        (fx, _, _), (below, fy, _), last = rows
+        if not (fx > 0.0 and fy > 0.0 and below == 0.0 and last == (0.0, 0.0, 1.0)):
+            raise ValueError("expected [[fx, skew, cx], [0, fy, cy], [0, 0, 1]] with fx, fy > 0")
+        return rows
+
+    @field_validator("light_plane")
+    @classmethod
+    def _is_met_by_the_optic_axis(cls, plane: Vector4) -> Vector4:
+        _, _, c, d = plane
+        if c == 0.0 or not -d / c > 0.0:
+            raise ValueError("expected a, b, c, d of a plane that the optic axis meets in front "
+                             "of the camera: -d / c above 0")
+        return plane
+
+    @field_validator("camera_covariance", "light_plane_covariance")
+    @classmethod
+    def _is_a_covariance(cls, rows: Covariance | None, info: ValidationInfo) -> Covariance | None:
+        return rows and check_covariance(rows, 9 if info.field_name == "camera_covariance" else 4)
 
     @cached_property
     def model(self) -> SensorModel:
@@ -37,6 +64,30 @@ class SensorDocument(Document):
             _array_or_none(self.camera_covariance),
             _array_or_none(self.light_plane_covariance),
         )
+
+
+def check_covariance(rows: Covariance, size: int) -> Covariance:
+    """Refuse with ValueError what is not size x size, symmetric, and without negative variance."""
+    if len(rows) != size or any(len(row) != size for row in rows):
+        raise ValueError(f"expected a covariance of {size} rows with {size} numbers")
+    matrix = np.array(rows, dtype=np.float64)
+    spread = np.sqrt(np.abs(np.diag(matrix)))
+    if not np.allclose(matrix, matrix.T, rtol=1e-6, atol=0.0):
+        raise ValueError("expected a covariance: it is symmetric")
+    whitened = matrix / np.outer(spread, spread).clip(min=np.finfo(np.float64).tiny)
+    if np.linalg.eigvalsh(whitened).min() < -1e-6:
+        raise ValueError("expected a covariance: it has no negative variance in any direction")
+    return rows
+
+
+def _check_pose_covariance(rows: Covariance) -> Covariance:
+    return check_covariance(rows, 6)
+
+
+NotNegative = Annotated[Number, Field(ge=0)]
+PoseCovariance = Annotated[tuple[Vector6, Vector6, Vector6, Vector6, Vector6, Vector6],
+                           AfterValidator(_check_pose_covariance)]
+"""6x6 over a small rotation (rad) and translation (mm), order rx ry rz tx ty tz."""
 
 
 class RobotRecord(Document):
@@ -60,9 +111,9 @@ class HandEyeDocument(Document):
     flange_from_camera: Matrix4
     robot: RobotRecord
     sensor_serial: str | None = None
-    covariance: tuple[Vector6, Vector6, Vector6, Vector6, Vector6, Vector6] | None = None
-    robot_repeatability_mm: Number = 0.0
-    robot_repeatability_deg: Number = 0.0
+    covariance: PoseCovariance | None = None
+    robot_repeatability_mm: NotNegative = 0.0
+    robot_repeatability_deg: NotNegative = 0.0
 
 
 class BodyDocument(Document):
@@ -70,8 +121,20 @@ class BodyDocument(Document):
 
     base_from_body: Matrix4
     calibration_set: str | None = None
-    covariance: tuple[Vector6, Vector6, Vector6, Vector6, Vector6, Vector6] | None = None
+    covariance: PoseCovariance | None = None
     datums: tuple[str, ...] = ()
+
+
+class KinematicsDocument(Document):
+    """`kinematics.yaml`: how the arm's Denavit-Hartenberg rows differ from the published ones, as
+    estimated from board views (mm, rad). Used for measuring only, never sent to the controller.
+    """
+
+    model: str
+    a: Vector6
+    d: Vector6
+    alpha: Vector6
+    theta: Vector6
 
 
 class ActiveDocument(Document):
@@ -92,6 +155,7 @@ class Calibration:
     sensor: SensorDocument
     hand_eye: HandEyeDocument
     body: BodyDocument
+    kinematics: KinematicsDocument | None = None
 
     @cached_property
     def flange_from_camera(self) -> Transform:
@@ -108,6 +172,5 @@ class Calibration:
         return self.base_from_body.inverse @ base_from_flange @ self.flange_from_camera
 
 
-def _array_or_none(rows: tuple[tuple[float, ...], ...] | None) -> Array | None:
+def _array_or_none(rows: Covariance | None) -> Array | None:
     return None if rows is None else np.array(rows, dtype=np.float64)
-

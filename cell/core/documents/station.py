@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -79,6 +80,11 @@ class StationDocument(Document):
     approach_mm: NotNegative = 20.0
     still_mm: Positive = 0.02
     still_deg: Positive = 0.01
+
+    @property
+    def still_rad(self) -> float:
+        """How far the flange may turn during an exposure."""
+        return math.radians(self.still_deg)
 
     @property
     def simulated(self) -> bool:

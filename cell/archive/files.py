@@ -1,0 +1,58 @@
+"""Text files: read with a clear refusal, written so that a crash leaves the old or the new one."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from cell.core.errors import DocumentError
+
+LARGEST = 10_000_000  # bytes; a job's texts have some thousands
+
+
+def read_text(path: Path) -> str:
+    """Read a UTF-8 text file.
+
+    Raises:
+        DocumentError: absent, a folder, not readable, too large, or not UTF-8 text.
+    """
+    try:
+        if path.stat().st_size > LARGEST:
+            raise DocumentError(f"expected at most {LARGEST // 10**6} MB of text", source=str(path))
+        return path.read_bytes().decode("utf-8")
+    except FileNotFoundError:
+        raise DocumentError("there is no such file", source=str(path)) from None
+    except UnicodeDecodeError as error:
+        line = path.read_bytes()[:error.start].count(b"\n") + 1
+        raise DocumentError("expected UTF-8 text; came other bytes", source=str(path),
+                            place=f"line {line}") from None
+    except OSError as error:
+        raise DocumentError(f"cannot be read: {error.strerror}", source=str(path)) from None
+
+
+def replace_text(path: Path, text: str) -> None:
+    """Write a file in one step: after a crash it has the old text or the new, never a part.
+
+    Raises:
+        DocumentError: the folder cannot be written.
+    """
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        with beside.open("w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        beside.replace(path)
+        sync_folder(path.parent)
+    except OSError as error:
+        beside.unlink(missing_ok=True)
+        raise DocumentError(f"cannot be written: {error.strerror}", source=str(path)) from None
+
+
+def sync_folder(folder: Path) -> None:
+    """Make names that were created or changed in a folder survive a loss of power."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

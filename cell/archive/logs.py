@@ -1,0 +1,44 @@
+"""The folder of recordings: checked before anything moves, names that say nothing of the body."""
+
+from __future__ import annotations
+
+import secrets
+import tempfile
+from datetime import UTC, datetime
+from pathlib import Path
+
+from cell.core.errors import DocumentError
+
+
+def new_log(folder: Path, job: str) -> Path:
+    """Name a new recording, `<job>_<time>_<random>.rrd`, in a folder that can take it.
+
+    Raises:
+        DocumentError: the folder cannot be made or written, is full, or the name exists.
+    """
+    check_logs(folder)
+    moment = datetime.now(UTC).strftime("%Y-%m-%dT%H%M%SZ")
+    log = folder / f"{job}_{moment}_{secrets.token_hex(4)}.rrd"
+    if log.exists():
+        raise DocumentError("a recording of that name exists; none is ever overwritten",
+                            source=str(log))
+    return log
+
+
+def check_logs(folder: Path) -> None:
+    """Make the folder where it is absent, and try that a megabyte can be written there.
+
+    Raises:
+        DocumentError: it is a file, cannot be made or written, or is full.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder) as trial:
+            trial.write(bytes(1_000_000))
+            trial.flush()
+    except FileExistsError:
+        raise DocumentError("expected a folder for the recordings; came a file",
+                            source=str(folder)) from None
+    except OSError as error:
+        raise DocumentError(f"recordings cannot be written here: {error.strerror}",
+                            source=str(folder)) from None
