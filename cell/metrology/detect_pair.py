@@ -1,0 +1,59 @@
+"""Find hole and stripe together: the hole to be measured is the one that the stripe crosses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from cell.core.observation import Image
+from cell.core.optics import SensorModel
+from cell.metrology.detect_hole import detect_rim
+from cell.metrology.detect_stripe import crosses, follow_stripe
+from cell.metrology.features import Expected, Rim, Stripe
+from cell.metrology.find_holes import Hole, find_holes
+from cell.metrology.reasons import refusal
+from cell.metrology.ridge import Ridge, find_ridge, runs_upright
+
+ANYWHERE = 100.0  # mm, the standard deviation of where a hole may be in the picture
+
+
+def detect_pair(hole_image: Image, stripe_image: Image, sensor: SensorModel,
+                expected: Expected) -> tuple[Rim, Stripe]:
+    """Find the rim of the hole that the stripe crosses, and the stripe on both its sides.
+
+    Raises:
+        UnmeasurableError: with one of the documented reasons.
+    """
+    upright = runs_upright(sensor.light_plane)
+    ridge = find_ridge(stripe_image, upright=upright)
+    if ridge is None:
+        if find_ridge(hole_image, upright=upright) is not None and _is_dark(stripe_image):
+            raise refusal("images_swapped")
+        raise refusal("no_laser")
+    holes = find_holes(hole_image, sensor.camera, _at_depth(expected, ridge, sensor))
+    hole = _crossed(holes, ridge)
+    rim = detect_rim(hole_image, hole)
+    return rim, follow_stripe(stripe_image, ridge, rim, sensor, expected)
+
+
+def _at_depth(expected: Expected, ridge: Ridge, sensor: SensorModel) -> Expected:
+    """Add how far away the sheet is, which the stripe tells, where nothing else does."""
+    if expected.centre is not None:
+        return expected
+    length = sensor.camera.image_size[1 if ridge.upright else 0]
+    on_sheet = sensor.light_plane.meet(sensor.camera.rays(ridge.points(length)))
+    return replace(expected, centre=np.median(on_sheet, axis=0), centre_sigma=ANYWHERE)
+
+
+def _crossed(holes: list[Hole], ridge: Ridge) -> Hole:
+    if not holes:
+        raise refusal("no_hole")
+    for hole in holes:
+        if crosses(ridge, hole.ellipse) and hole.coverage > 0.7 * holes[0].coverage:
+            return hole
+    raise refusal("laser_misses_hole")
+
+
+def _is_dark(image: Image) -> bool:
+    return float(np.mean(image)) < 20.0

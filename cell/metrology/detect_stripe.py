@@ -1,0 +1,145 @@
+"""Find the laser stripe on the sheet, on both sides of the hole, to a fraction of a pixel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from cell.core.geometry import Array, Plane
+from cell.core.observation import Image
+from cell.core.optics import CameraModel, SensorModel
+from cell.metrology.ellipse import Ellipse
+from cell.metrology.features import Expected, Rim, Stripe
+from cell.metrology.reasons import refusal
+from cell.metrology.ridge import Ridge, find_ridge, runs_upright
+
+DIE_ROLL = 0.7      # mm beside the rim, where a sheet of unknown thickness bends into the hole
+LENGTH = 12.0       # mm of stripe used on either side: the sheet is flat as far as that
+HALF_WINDOW = 10    # px across the stripe: four standard deviations of a wide one
+FLOOR = 0.2         # of the stripe's height, below which nothing counts towards its centre
+LEAST_LINES = 8     # on either side
+TUKEY = 4.685
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """The image across the stripe: `grey` (n, m) over its background, at `u` (n, m), `v` (n,)."""
+
+    grey: Array
+    u: Array
+    v: Array
+
+
+def detect_stripe(image: Image, rim: Rim, camera: CameraModel, light_plane: Plane,
+                  expected: Expected) -> Stripe:
+    """Locate the stripe on the sheet beside the hole.
+
+    Raises:
+        UnmeasurableError: there is no stripe, it misses the hole, or its two sides disagree.
+    """
+    ridge = find_ridge(image, upright=runs_upright(light_plane))
+    if ridge is None:
+        raise refusal("no_laser")
+    return follow_stripe(image, ridge, rim, SensorModel(camera, light_plane), expected)
+
+
+def follow_stripe(image: Image, ridge: Ridge, rim: Rim, sensor: SensorModel,
+                  expected: Expected) -> Stripe:
+    """Locate a stripe that was found as a whole, line by line."""
+    hole = _hole(rim)
+    v, side = _lines_beside(image, ridge, hole, _reaches(ridge, hole, sensor, expected))
+    cut = _cut(image, ridge, v)
+    u, height = _centres(cut)
+    bright = height > 0.3 * np.median(height)
+    points, side = ridge.pixels(u[bright], v[bright]), side[bright]
+    if min((side < 0).sum(), (side > 0).sum()) < LEAST_LINES:
+        raise refusal("stripe_too_short")
+    miss, scale = _straightness(points, sensor.camera, ridge.upright)
+    good = np.abs(miss) < 3.5 * scale
+    step = float(np.median(miss[good & (side > 0)]) - np.median(miss[good & (side < 0)]))
+    return Stripe(points=points[good], side=side[good], sigma=scale,
+                  correlation=_correlation(miss[good]),
+                  quality={"height": ridge.height, "step": step, "share": ridge.share})
+
+
+def crosses(ridge: Ridge, hole: Ellipse) -> bool:
+    """Tell whether the stripe passes through an ellipse."""
+    return bool((hole.reach(ridge.points(4096)) < 1.0).any())
+
+
+def _hole(rim: Rim) -> Ellipse:
+    x, y, major, minor, angle = rim.ellipse
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return Ellipse(np.array([x, y]), turn @ np.diag([major, minor]) @ turn.T)
+
+
+def _reaches(ridge: Ridge, hole: Ellipse, sensor: SensorModel,
+             expected: Expected) -> tuple[float, float]:
+    """Say how far from the rim the stripe is used: from the end of the die roll, px, and up to."""
+    die_roll = DIE_ROLL if expected.thickness is None else np.clip(expected.thickness / 2, 0.5, 1.0)
+    along = hole.centre[1 if ridge.upright else 0]
+    place = ridge.pixels(ridge.across(np.array([along])), np.array([along]))
+    depth = float(sensor.light_plane.meet(sensor.camera.rays(place))[0, 2])
+    scale = float(sensor.camera.matrix[0, 0]) / depth
+    return max(float(die_roll) * scale, 4.0), max(LENGTH * scale, hole.radius)
+
+
+def _lines_beside(image: Image, ridge: Ridge, hole: Ellipse,
+                  reaches: tuple[float, float]) -> tuple[Array, Array]:
+    """Choose the lines v on either side of the hole, and say which side (-1, +1) each is on."""
+    length, width = image.shape if ridge.upright else image.shape[::-1]
+    v = np.arange(length, dtype=np.float64)
+    reach = hole.reach(ridge.points(length))
+    if not (reach < 1.0).any():
+        raise refusal("laser_misses_hole")
+    inside = v[reach < 1.0]
+    beyond = np.maximum(inside[0] - v, v - inside[-1])
+    clear = (reach - 1.0) * hole.radius > reaches[0]
+    u = ridge.across(v)
+    seen = (u > HALF_WINDOW + 1) & (u < width - HALF_WINDOW - 2)
+    use = clear & seen & (beyond < reaches[1])
+    return v[use], np.where(v[use] < inside[0], -1.0, 1.0)
+
+
+def _cut(image: Image, ridge: Ridge, v: Array) -> Cut:
+    turned = image if ridge.upright else image.T
+    u = np.rint(ridge.across(v)).astype(np.intp)[:, None] + np.arange(-HALF_WINDOW, HALF_WINDOW + 1)
+    grey = turned[v.astype(np.intp)[:, None], u].astype(np.float64)
+    left, right = (cv2.blur(np.median(part, axis=1).reshape(-1, 1), (1, 15))
+                   for part in (grey[:, :4], grey[:, -4:]))
+    ramp = np.linspace(0.0, 1.0, grey.shape[1])
+    return Cut(grey - left * (1.0 - ramp) - right * ramp, u.astype(np.float64), v)
+
+
+def _centres(cut: Cut) -> tuple[Array, Array]:
+    """Give the centre of mass (n,) across the stripe, and its height, line by line."""
+    height = cut.grey.max(axis=1)
+    weight = np.clip(cut.grey - FLOOR * height[:, None], 0.0, None)
+    total = np.maximum(weight.sum(axis=1), 1e-9)
+    return (weight * cut.u).sum(axis=1) / total, height
+
+
+def _straightness(points: Array, camera: CameraModel, upright: bool) -> tuple[Array, float]:
+    """Measure how far points lie from their common line, undistorted; px, and the spread."""
+    across, along = camera.normalise(points).T[::1 if upright else -1]
+    focal = float(camera.matrix[0, 0] if upright else camera.matrix[1, 1])
+    rows = np.column_stack([np.ones_like(along), along])
+    miss, scale = across - np.median(across), 1.0
+    for step in range(8):
+        scale = max(1e-3 / focal, 1.4826 * float(np.median(np.abs(miss))))
+        weight = np.clip(1.0 - (miss / (TUKEY * scale)) ** 2, 0.0, None) if step else 1.0 + 0 * miss
+        line = np.linalg.lstsq(rows * weight[:, None], across * weight, rcond=None)[0]
+        miss = across - rows @ line
+    return miss * focal, scale * focal
+
+
+def _correlation(miss: Array) -> float:
+    """Count the neighbours that share one error: the integral of the autocorrelation."""
+    centred = miss - miss.mean()
+    spectrum = np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2
+    product = np.fft.irfft(spectrum)[:min(30, len(centred))]
+    shares = product[1:] / max(product[0], 1e-12)
+    until = int(np.argmax(shares < 0.1)) if (shares < 0.1).any() else len(shares)
+    return float(1.0 + 2.0 * shares[:until].sum())

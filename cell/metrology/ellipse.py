@@ -1,0 +1,93 @@
+"""An ellipse in the image, held so that a circle is nothing special.
+
+A point at the parameter t is `centre + shape @ (cos t, sin t)` with a symmetric 2x2 `shape`, so
+five numbers move it smoothly: where the usual angle of the long axis means nothing at a circle,
+`shape` is just a multiple of one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cell.core.geometry import Array
+from cell.core.optics import CameraModel
+
+
+@dataclass(frozen=True, eq=False)
+class Ellipse:
+    """An ellipse in pixels: `centre` (2,) and symmetric, positive definite `shape` (2, 2)."""
+
+    centre: Array
+    shape: Array
+
+    @classmethod
+    def circle(cls, x: float, y: float, radius: float) -> Ellipse:
+        """Build a circle (px)."""
+        return cls(np.array([x, y]), radius * np.eye(2))
+
+    @classmethod
+    def through(cls, points: ArrayLike) -> Ellipse:
+        """Build from the points (n, 2) of an ellipse spaced evenly in its parameter t."""
+        located = np.asarray(points, dtype=np.float64)
+        centre = located.mean(axis=0)
+        return cls(centre, _root(2.0 * np.cov((located - centre).T, bias=True)))
+
+    @property
+    def radius(self) -> float:
+        """The mean of the semi-axes, px."""
+        return float(np.trace(self.shape)) / 2.0
+
+    @property
+    def axes(self) -> tuple[float, float, float]:
+        """Semi-major and semi-minor axis (px) and the angle of the major one to x (rad)."""
+        (minor, major), vectors = np.linalg.eigh(self.shape)
+        return float(major), float(minor), float(np.arctan2(vectors[1, 1], vectors[0, 1]))
+
+    def points(self, t: Array) -> Array:
+        """Give the points (n, 2) at the parameters t (n,)."""
+        return self.centre + _circle(t) @ self.shape
+
+    def normals(self, t: Array) -> Array:
+        """Give the unit outward normals (n, 2) at the parameters t (n,)."""
+        outward = _circle(t) @ np.linalg.inv(self.shape)
+        return outward / np.linalg.norm(outward, axis=1, keepdims=True)
+
+    def design(self, t: Array) -> Array:
+        """Give how far the ellipse moves along its normals (n, 5) for each of its five numbers.
+
+        The columns are centre x and y and the elements 00, 01 and 11 of the shape.
+        """
+        (cos, sin), (n_x, n_y) = _circle(t).T, self.normals(t).T
+        return np.column_stack([n_x, n_y, n_x * cos, n_x * sin + n_y * cos, n_y * sin])
+
+    def moved(self, step: Array) -> Ellipse:
+        """Move by the five numbers of `design`."""
+        x, y, s00, s01, s11 = step
+        return Ellipse(self.centre + np.array([x, y]),
+                       self.shape + np.array([[s00, s01], [s01, s11]]))
+
+    def reach(self, points: ArrayLike) -> Array:
+        """Measure where points (n, 2) lie: below 1 inside, 1 on the ellipse, above 1 outside."""
+        inward = (np.asarray(points, dtype=np.float64) - self.centre) @ np.linalg.inv(self.shape)
+        return np.linalg.norm(inward, axis=-1)
+
+
+def project_circle(camera: CameraModel, centre: Array, normal: Array, radius: float) -> Ellipse:
+    """Project the circle around `centre` (3,) mm, through lens and distortion, to pixels."""
+    u = np.cross(normal, [0.0, 1.0, 0.0] if abs(normal[1]) < abs(normal[0]) else [1.0, 0.0, 0.0])
+    u = u / np.linalg.norm(u)
+    v = np.cross(normal / np.linalg.norm(normal), u)
+    turn = _circle(np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False))
+    return Ellipse.through(camera.project(centre + radius * turn @ np.stack([u, v])))
+
+
+def _circle(t: Array) -> Array:
+    return np.column_stack([np.cos(t), np.sin(t)])
+
+
+def _root(matrix: Array) -> Array:
+    values, vectors = np.linalg.eigh(matrix)
+    return (vectors * np.sqrt(values)) @ vectors.T

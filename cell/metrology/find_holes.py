@@ -1,0 +1,97 @@
+"""Where holes are in the ring-light picture, roughly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cell.core.geometry import Array
+from cell.core.observation import Image
+from cell.core.optics import CameraModel
+from cell.metrology.edges import find_edges, sample_band, smooth_around
+from cell.metrology.ellipse import Ellipse, project_circle
+from cell.metrology.features import Expected
+from cell.metrology.rim_fit import agree
+from cell.metrology.voting import Circle, vote_for_circles
+
+SMALLEST_RADIUS = 14.0  # px, of a hole that nothing is known of
+RAYS = 120
+LEAST_COVERAGE = 0.5    # of the rim, to be a hole at all
+
+
+@dataclass(frozen=True, eq=False)
+class Hole:
+    """A hole as the search knows it: a rough `ellipse`, `inside` (-1 darker, +1 brighter than the
+    metal), the share of its rim that was seen (`coverage`) and the `contrast` there (grey/px).
+    """
+
+    ellipse: Ellipse
+    inside: int
+    coverage: float
+    contrast: float
+
+
+def find_holes(image: Image, camera: CameraModel, expected: Expected) -> list[Hole]:
+    """Find the holes of an image, the most complete first."""
+    region = _region(camera, expected)
+    part = image[region[1]:region[3], region[0]:region[2]]
+    octaves = _octaves(camera, expected, min(part.shape))
+    found = [_look(image, _shifted(circle, region), expected, camera)
+             for inside in (-1, +1) for radii in octaves
+             for circle in vote_for_circles(part, radii, inside)]
+    holes = [hole for hole in found if hole is not None and hole.coverage >= LEAST_COVERAGE]
+    return sorted(holes, key=lambda hole: -hole.coverage * hole.contrast**0.5)
+
+
+def _region(camera: CameraModel, expected: Expected) -> tuple[int, int, int, int]:
+    """Give the part of the image to search: left, top, right, bottom."""
+    width, height = camera.image_size
+    if expected.centre is None:
+        return 0, 0, width, height
+    x, y = camera.project(expected.centre)
+    reach = 3.0 * expected.centre_sigma + 1.5 * (expected.radius or 15.0)
+    reach = reach * camera.matrix[0, 0] / float(expected.centre[2]) + 16.0
+    left, top = int(np.clip(x - reach, 0, width - 2)), int(np.clip(y - reach, 0, height - 2))
+    return (left, top, int(np.clip(x + reach, left + 2, width)),
+            int(np.clip(y + reach, top + 2, height)))
+
+
+def _octaves(camera: CameraModel, expected: Expected, size: int) -> list[Array]:
+    """Give the radii to look for, px: a few around the expected one, or octaves of all."""
+    if expected.radius is not None and expected.centre is not None:
+        radius = expected.radius * camera.matrix[0, 0] / float(expected.centre[2])
+        return [radius * np.array([0.95, 1.0, 1.05])]
+    starts = SMALLEST_RADIUS * 2.0 ** np.arange(12)
+    return [start * 2.0 ** np.arange(0.0, 1.0, 1.0 / 6.0) for start in starts if 2 * start < size]
+
+
+def _shifted(circle: Circle, region: tuple[int, int, int, int]) -> Circle:
+    return Circle(circle.x + region[0], circle.y + region[1], circle.radius, circle.inside,
+                  circle.votes)
+
+
+def _look(image: Image, circle: Circle, expected: Expected, camera: CameraModel) -> Hole | None:
+    """Look closer at a place that was voted for."""
+    start = _expected_ellipse(circle, camera, expected)
+    smooth = smooth_around(image, start, 0.3 * circle.radius)
+    step = max(0.5, circle.radius / 60.0)
+    band = sample_band(smooth, start, 0.22 * circle.radius, rays=RAYS, step=step)
+    steepest = float(np.median((-circle.inside * band.slope).max(axis=1)))
+    edges = find_edges(band, circle.inside, 0.4 * steepest)
+    if len(edges.ray) < 12:
+        return None
+    ellipse, close = agree(band, edges, max(1.0, 0.02 * circle.radius),
+                           free=3 if expected.normal is not None else 5)
+    if not 0.6 < ellipse.radius / circle.radius < 1.6:
+        return None
+    contrast = float(np.median(edges.strength[close])) if close.any() else 0.0
+    return Hole(ellipse, circle.inside, len(np.unique(edges.ray[close])) / RAYS, contrast)
+
+
+def _expected_ellipse(circle: Circle, camera: CameraModel, expected: Expected) -> Ellipse:
+    if expected.normal is None:
+        return Ellipse.circle(circle.x, circle.y, circle.radius)
+    ray = camera.rays([circle.x, circle.y])
+    tilted = project_circle(camera, ray, expected.normal, circle.radius / camera.matrix[0, 0])
+    return Ellipse(np.array([circle.x, circle.y]), tilted.shape * circle.radius / tilted.radius)

@@ -1,0 +1,112 @@
+"""The laser stripe as a whole: a thin bright ridge along a straight line.
+
+A stripe may run along the rows or the columns of the image. It is always looked at with its length
+downwards: `u` runs across it, `v` along it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from cell.core.geometry import Array, Plane
+from cell.core.observation import Image
+from cell.metrology.arrays import Grey, Mask
+
+BIN = 4                # lines along the stripe that are averaged before the search
+NARROW, WIDE = 2.0, 8.0  # px, the scales that a ridge stands out between
+PEAKS = 2              # ridges kept a line: the stripe, and one on what lies behind the hole
+DRAWS = 300
+TOLERANCE = 2.5        # px, lens distortion over the length included
+SIGNIFICANCE = 6.0     # of a ridge above the image's own unrest
+LEAST_SHARE = 0.15     # of the lines must carry the stripe
+GOLDEN = 0.6180339887498949
+
+
+@dataclass(frozen=True, eq=False)
+class Ridge:
+    """A straight stripe: across it at `v`, it lies at `offset + slope v`, px.
+
+    `upright` says whether the stripe runs along the columns (u is x); `share` how much of the
+    image's length it covers, `height` its typical height in grey over its surroundings.
+    """
+
+    offset: float
+    slope: float
+    upright: bool
+    share: float
+    height: float
+
+    def across(self, v: Array) -> Array:
+        """Say where the stripe lies across its length, at each v."""
+        return self.offset + self.slope * v
+
+    def points(self, length: int) -> Array:
+        """Give pixels (length, 2), x and y, one for each line along the stripe."""
+        v = np.arange(length, dtype=np.float64)
+        return self.pixels(self.across(v), v)
+
+    def pixels(self, u: Array, v: Array) -> Array:
+        """Turn across and along into pixels (n, 2), x and y."""
+        return np.column_stack([u, v] if self.upright else [v, u])
+
+
+def runs_upright(light_plane: Plane) -> bool:
+    """Tell whether the stripe of a light plane runs along the image's columns."""
+    return abs(float(light_plane.normal[0])) >= abs(float(light_plane.normal[1]))
+
+
+def find_ridge(image: Image, *, upright: bool) -> Ridge | None:
+    """Find the longest straight ridge of an image, or None where there is none."""
+    turned = image if upright else np.ascontiguousarray(image.T)
+    response = _response(turned)
+    u, line, height = _candidates(response)
+    if len(u) < 2:
+        return None
+    v = line * BIN + (BIN - 1) / 2.0
+    offset, slope, near = _straightest(u, v)
+    share = len(np.unique(line[near])) / len(response)
+    if share < LEAST_SHARE:
+        return None
+    slope, offset = np.polyfit(v[near], u[near], 1)
+    return Ridge(float(offset), float(slope), upright, share, float(np.median(height[near])))
+
+
+def _response(turned: Image) -> Grey:
+    length, width = turned.shape
+    binned = cv2.resize(turned, (width, max(1, length // BIN)), interpolation=cv2.INTER_AREA)
+    lines = binned.astype(np.float32)
+    return (cv2.GaussianBlur(lines, (0, 0), sigmaX=NARROW, sigmaY=0.8)
+            - cv2.GaussianBlur(lines, (0, 0), sigmaX=WIDE, sigmaY=0.8))
+
+
+def _candidates(response: Grey) -> tuple[Array, Array, Array]:
+    """Give the highest ridges of each line that stand out: u, line and height."""
+    unrest = 1.4826 * float(np.median(np.abs(response))) + 0.05
+    summit = ((response[:, 1:-1] > response[:, :-2]) & (response[:, 1:-1] >= response[:, 2:])
+              & (response[:, 1:-1] > SIGNIFICANCE * unrest))
+    heights = np.where(summit, response[:, 1:-1], np.float32(0.0))
+    column = np.argpartition(-heights, PEAKS, axis=1)[:, :PEAKS]
+    line = np.repeat(np.arange(len(response)), PEAKS)
+    column, height = column.ravel(), np.take_along_axis(heights, column, axis=1).ravel().astype(np.float64)
+    real = height > 0.0
+    return column[real].astype(np.float64) + 1.0, line[real].astype(np.float64), height[real]
+
+
+def _straightest(u: Array, v: Array) -> tuple[float, float, Mask]:
+    """Find the line that most candidates lie on (RANSAC with evenly spread draws)."""
+    draw, count = np.arange(DRAWS), len(u)
+    first = np.floor(count * np.mod(draw * GOLDEN, 1.0)).astype(np.intp)
+    second = np.floor(count * np.mod(draw * np.sqrt(2.0), 1.0)).astype(np.intp)
+    far = np.abs(v[first] - v[second]) > 3 * BIN
+    if not far.any():
+        return 0.0, 0.0, np.zeros(count, dtype=bool)
+    first, second = first[far], second[far]
+    slope = (u[second] - u[first]) / (v[second] - v[first])
+    offset = u[first] - slope * v[first]
+    miss = np.abs(offset[:, None] + slope[:, None] * v - u) / TOLERANCE
+    agreement = np.clip(1.0 - miss**2, 0.0, None).sum(axis=1) * (np.abs(slope) < 1.0)
+    best = int(np.argmax(agreement))
+    return float(offset[best]), float(slope[best]), miss[best] < 1.0

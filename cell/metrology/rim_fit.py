@@ -1,0 +1,97 @@
+"""An ellipse through the edges that agree, whatever the others say."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cell.core.geometry import Array
+from cell.metrology.arrays import Indices, Mask
+from cell.metrology.edges import Band, Edges
+from cell.metrology.ellipse import Ellipse
+
+DRAWS = 400
+TUKEY = 4.685  # of the biweight: 95 % efficient on Gaussian noise
+GOLDEN = 0.6180339887498949
+
+
+def agree(band: Band, edges: Edges, tolerance: float, *, free: int = 5) -> tuple[Ellipse, Mask]:
+    """Find the ellipse near the band's own that most edges agree with (RANSAC).
+
+    The draws are evenly spread (Weyl sequences), one edge from each of `free` equal sectors, so
+    that the same edges always give the same answer.
+
+    Args:
+        band: the profiles; its ellipse is where the search starts.
+        edges: all edges on them, right and wrong.
+        tolerance: how near an edge has to be to agree, px.
+        free: 5 for any ellipse, 3 to keep the shape and move only centre and size.
+
+    Returns:
+        The ellipse, and which edges agree (k,).
+    """
+    design = _design(band, free)
+    rows = design[edges.ray]
+    picks = _draws(edges.ray, len(band.t), free)
+    solved = _solve(rows[picks], edges.offset[picks])
+    miss = np.abs(solved @ rows.T - edges.offset)
+    near = np.clip(1.0 - (miss / tolerance) ** 2, 0.0, None) @ np.ones(len(edges.offset))
+    winner = solved[int(np.argmax(near))]
+    return _moved(band.ellipse, winner, free), np.abs(rows @ winner - edges.offset) < tolerance
+
+
+def settle(band: Band, edges: Edges, *, floor: float,
+           free: int = 5) -> tuple[Ellipse, Array, float]:
+    """Fit the ellipse to the edges near the band's own by Tukey's biweight.
+
+    Args:
+        band: the profiles; its ellipse is the start.
+        edges: the edges.
+        floor: the smallest scale that residuals are judged by, px.
+        free: as in `agree`.
+
+    Returns:
+        The ellipse, the residuals (k,) px, and their robust standard deviation.
+    """
+    rows = _design(band, free)[edges.ray]
+    step: Array = np.zeros(free)
+    miss, scale = edges.offset, _spread(edges.offset)
+    for _ in range(8):
+        miss = edges.offset - rows @ step
+        scale = max(floor, _spread(miss))
+        weight = np.clip(1.0 - (miss / (TUKEY * scale)) ** 2, 0.0, None)  # the biweight's root
+        step = np.linalg.lstsq(rows * weight[:, None], edges.offset * weight, rcond=None)[0]
+    return _moved(band.ellipse, step, free), edges.offset - rows @ step, scale
+
+
+def _design(band: Band, free: int) -> Array:
+    full = band.ellipse.design(band.t)
+    if free == 5:
+        return full
+    growth = full[:, 2:] @ band.ellipse.shape[[0, 0, 1], [0, 1, 1]] / band.ellipse.radius
+    return np.column_stack([full[:, :2], growth])
+
+
+def _moved(ellipse: Ellipse, step: Array, free: int) -> Ellipse:
+    if free == 5:
+        return ellipse.moved(step)
+    grown = ellipse.shape * (1.0 + step[2] / ellipse.radius)
+    return Ellipse(ellipse.centre + step[:2], grown)
+
+
+def _draws(ray: Indices, rays: int, free: int) -> Indices:
+    """Draw `free` edges (DRAWS, free), each from a sector of its own, the first anywhere."""
+    order, draw = np.argsort(ray, kind="stable"), np.arange(DRAWS)
+    turn = np.stack([draw * GOLDEN + (sector + np.mod(draw * np.sqrt(2.0 + 3 * sector), 1.0)) / free
+                     for sector in range(free)], axis=1)
+    picks = np.searchsorted(ray[order], rays * np.mod(turn, 1.0))
+    return order[np.minimum(picks, len(ray) - 1)]
+
+
+def _solve(rows: Array, offset: Array) -> Array:
+    damped: Array = rows.swapaxes(1, 2) @ rows + 1e-9 * np.eye(rows.shape[2])
+    solved: Array = np.linalg.solve(damped, rows.swapaxes(1, 2) @ offset[..., None])[..., 0]
+    return solved
+
+
+def _spread(values: Array) -> float:
+    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
