@@ -1,0 +1,132 @@
+"""The database itself: SQLite in a file, or a PostgreSQL server by URL."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Connection, Engine, create_engine, event, insert, inspect, select
+from sqlalchemy.engine import make_url
+from sqlalchemy.exc import (
+    ArgumentError,
+    InterfaceError,
+    InternalError,
+    NoSuchModuleError,
+    OperationalError,
+    SQLAlchemyError,
+)
+
+from cell.core.errors import CellError, DocumentError
+from cell.results.tables import RESULTS, SCHEMA, meta, metadata
+
+WAIT = 5.0
+"""Seconds that a statement waits for another writer, and a connection for its server."""
+
+PASSING = (OperationalError, InterfaceError, InternalError)
+"""Errors of the connection, the disk or a lock, not of what was written."""
+
+
+class DatabaseError(CellError):
+    """Report that the results database does not answer (`passing`: trying again may help) or
+    refuses what it was given.
+    """
+
+    exit_code = 4
+
+    def __init__(self, message: str, *, passing: bool) -> None:
+        self.passing = passing
+        super().__init__(message)
+
+
+class Database:
+    """An open results database. Use `transaction()`; close it when done."""
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+
+    @contextmanager
+    def transaction(self) -> Iterator[Connection]:
+        """Open a transaction that is committed as a whole or not at all.
+
+        Raises:
+            DatabaseError: the database does not answer, or refuses.
+        """
+        try:
+            with self._engine.begin() as connection:
+                yield connection
+        except SQLAlchemyError as error:
+            raise DatabaseError(f"results database {self}: {_first_line(error)}",
+                                passing=isinstance(error, PASSING)) from error
+
+    def close(self) -> None:
+        """Give all connections back."""
+        self._engine.dispose()
+
+    def __str__(self) -> str:
+        return self._engine.url.render_as_string(hide_password=True)
+
+
+def open_database(where: str | Path) -> Database:
+    """Open the database at a URL or in an SQLite file, and create its tables where there are none.
+
+    Raises:
+        DocumentError: the URL is wrong, its driver is not installed, or the schema is another one.
+        DatabaseError: it does not answer.
+    """
+    database = Database(_engine(where if isinstance(where, str) else f"sqlite:///{where}"))
+    try:
+        with database.transaction() as connection:
+            _check_schema(connection, str(database))
+    except CellError:
+        database.close()
+        raise
+    return database
+
+
+def recreate_results(connection: Connection) -> None:
+    """Drop and create the tables that are made from recordings."""
+    metadata.drop_all(connection, tables=RESULTS)
+    metadata.create_all(connection)
+
+
+def _engine(url: str) -> Engine:
+    try:
+        parsed = make_url(url)
+        sqlite = parsed.get_backend_name() == "sqlite"
+        engine = create_engine(parsed, connect_args={"timeout": WAIT} if sqlite else
+                               {"connect_timeout": int(WAIT)}, pool_pre_ping=not sqlite)
+    except ImportError as error:
+        raise DocumentError(f"needs a driver that is not installed ({error.name}): "
+                            "pip install cell-inspection[postgres]", source=_masked(url)) from error
+    except (ArgumentError, NoSuchModuleError) as error:
+        raise DocumentError("expected a database URL as postgresql+psycopg://host/name",
+                            source=_masked(url)) from error
+    if sqlite:
+        event.listen(engine, "connect", _prepare_sqlite)
+    return engine
+
+
+def _prepare_sqlite(connection: Any, _record: object) -> None:  # noqa: ANN401  DB-API connection
+    """Let readers read while one writes, and let a commit survive a power failure."""
+    for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON"):
+        connection.execute(f"PRAGMA {pragma}")
+
+
+def _check_schema(connection: Connection, source: str) -> None:
+    if not inspect(connection).has_table(meta.name):
+        metadata.create_all(connection)
+        connection.execute(insert(meta).values(schema=SCHEMA))
+    found = connection.execute(select(meta.c.schema)).scalar_one()
+    if found != SCHEMA:
+        raise DocumentError(f"has schema {found}, this program writes {SCHEMA}: open a new "
+                            "database and run `cell results rebuild`", source=source)
+
+
+def _first_line(error: SQLAlchemyError) -> str:
+    return (str(getattr(error, "orig", None) or error).strip().splitlines() or [repr(error)])[0]
+
+
+def _masked(url: str) -> str:
+    return url.rsplit("@", 1)[-1]
