@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from cell.core.documents.base import Document, Vector6
+from cell.core.documents.base import Document, Number, Vector6
 from cell.core.documents.station import NotNegative, Positive
 
 Identifier = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
@@ -20,12 +20,14 @@ class Via(Document):
 
 class Stop(Document):
     """One stop. With `joints_deg` the pose is taught; without, it is computed from the nominal, its
-    normal and the stand-off. `roll_deg` turns the sensor about its optic axis, `tilt_deg` leans it.
+    normal and the stand-off. `roll_deg` turns the sensor about its optic axis (at 0 the image is
+    upright: its y axis points to the body's -z), `tilt_deg` leans it about the image's x axis.
     """
 
     hole: Identifier
     joints_deg: Vector6 | None = None
-    roll_deg: float = 0.0
+    roll_deg: Number = 0.0
+    tilt_deg: Annotated[Number, Field(ge=-45, le=45)] = 0.0
     via: tuple[Via, ...] = ()
 
 
