@@ -44,6 +44,10 @@ class RobotIdentity:
     payload_kg: float
     tcp_offset: tuple[float, ...]  # x, y, z in mm and the rotation vector in rad
 
+    def as_text(self) -> dict[str, str]:
+        """Say it in words, for a record."""
+        return {name: str(value) for name, value in vars(self).items()}
+
 
 @dataclass(frozen=True, eq=False)
 class RobotState:
@@ -155,6 +159,13 @@ class Supervisor(Protocol):
 
 LineVerdict: TypeAlias = Literal["ok", "nok", "uncertain", "incomplete"]
 Command: TypeAlias = Literal["start", "abort", "reset", "bypass", "end_bypass", "stop"]
+Refusal: TypeAlias = Literal["", "unknown_type", "no_body", "no_body_id", "not_ready", "master_due",
+                             "result_held", "nothing_to_do"]
+Fault: TypeAlias = Literal[
+    "", "protective_stop", "safeguard_stop", "emergency_stop", "local_mode", "paused", "robot_lost",
+    "camera_lost", "lights_lost", "laser_dark", "disk_full", "recording_failed", "holes_refused",
+    "datum_missing", "master_failed", "body_moved", "program_fault"]
+"""Why the cell stands; each is a state of the shift and a code on the line."""
 
 
 @dataclass(frozen=True)
@@ -172,8 +183,8 @@ class Order:
 
 @dataclass(frozen=True)
 class LineStatus:
-    """What the cell says of itself at any time. `hole` of `holes` is the progress; `fault` is 0 or
-    a code of the fault table. `clear`: the arm stands outside of the body's way.
+    """What the cell says of itself at any time. `hole` of `holes` is the progress. `clear`: the
+    arm stands outside of the body's way.
     """
 
     state: str
@@ -183,7 +194,7 @@ class LineStatus:
     master_due: bool = False
     bypass: bool = False
     trial: bool = False
-    fault: int = 0
+    fault: Fault = ""
     hole: int = 0
     holes: int = 0
     seconds_left: int = 0
@@ -219,8 +230,8 @@ class Line(Protocol):
     def take(self, timeout: float) -> Order | None:
         """Wait for the next command, at its edge, for at most `timeout` seconds."""
 
-    def answer(self, order: Order, refusal: int = 0) -> None:
-        """Echo a command: accepted, or refused with a code of the fault table."""
+    def answer(self, order: Order, refusal: Refusal = "") -> None:
+        """Echo a command: accepted, or refused and why."""
 
     def publish(self, result: LineResult) -> None:
         """Show a result and hold it until it is acknowledged."""
