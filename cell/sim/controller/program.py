@@ -35,7 +35,7 @@ class ControlProgram:
             1: self._move_joints, 2: self._move_joints_to_pose, 3: self._move_line,
             4: self._move_line_to_joints, 29: self._set_tcp, 30: self._inverse, 31: self._protect,
             33: self._stop, 34: self._stop, 35: self._set_watchdog, 36: self._pose_within,
-            37: self._joints_within, 41: self._tcp_offset, 43: self._forward, 44: self._forward,
+            37: self._joints_within, 40: self._tcp_offset, 43: self._forward, 44: self._forward_of,
             46: self._inverse, 47: self._steady, 99: self._nothing, 255: self._end,
         }
 
@@ -140,6 +140,11 @@ class ControlProgram:
     def _forward(self) -> bool:
         flange = self._controller.arm.flange(self._controller.joints)
         return self._answer_vector(pose_of(flange @ self._controller.flange_from_tcp))
+
+    def _forward_of(self) -> bool:
+        """The TCP offset is taken from registers 6 to 11, whatever was left in them."""
+        flange = self._controller.arm.flange(self._doubles(6))
+        return self._answer_vector(pose_of(flange @ matrix_of(self._doubles(6, first=6))))
 
     def _joints_for(self, pose: Array) -> Array:
         controller = self._controller
