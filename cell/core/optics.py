@@ -54,6 +54,25 @@ class CameraModel:
             y = y - (f_x * g - g_x * f) / determinant
         return np.stack([x, y], axis=-1)
 
+    def pixel_by_normalised(self, normalised: ArrayLike) -> Array:
+        """Differentiate pixels by normalised coordinates (..., 2): matrices (..., 2, 2)."""
+        x, y = np.moveaxis(np.asarray(normalised, dtype=np.float64), -1, 0)
+        _, _, f_x, f_y, g_x, g_y = _distort(x, y, self.distortion)
+        rows = np.stack([np.stack([f_x, f_y], axis=-1), np.stack([g_x, g_y], axis=-1)], axis=-2)
+        return self.matrix[:2, :2] @ rows
+
+    def pixel_by_intrinsics(self, normalised: ArrayLike) -> Array:
+        """Differentiate pixels by fx, fy, cx, cy, k1, k2, p1, p2, k3: matrices (..., 2, 9)."""
+        x, y = np.moveaxis(np.asarray(normalised, dtype=np.float64), -1, 0)
+        x_d, y_d, *_ = _distort(x, y, self.distortion)
+        r2, xy, none, one = x * x + y * y, 2.0 * x * y, np.zeros_like(x), np.ones_like(x)
+        linear = np.stack([np.stack([x_d, none, one, none], axis=-1),
+                           np.stack([none, y_d, none, one], axis=-1)], axis=-2)
+        lens = np.stack([np.stack([x * r2, x * r2**2, xy, r2 + 2 * x * x, x * r2**3], axis=-1),
+                         np.stack([y * r2, y * r2**2, r2 + 2 * y * y, xy, y * r2**3], axis=-1)],
+                        axis=-2)
+        return np.concatenate([linear, self.matrix[:2, :2] @ lens], axis=-1)
+
     def rays(self, pixels: ArrayLike) -> Array:
         """Undistort pixels (..., 2) to rays (..., 3) with z = 1."""
         normalised = self.normalise(pixels)

@@ -8,6 +8,7 @@ from typing import Any, Literal, TypeAlias
 from cell.core.geometry import Array
 
 Verdict: TypeAlias = Literal["in_tolerance", "out_of_tolerance", "uncertain", "not_measured"]
+BodyVerdict: TypeAlias = Literal["in_tolerance", "out_of_tolerance", "uncertain", "incomplete"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,7 +19,7 @@ class Located:
     where the method does not estimate one. `budget` maps each source of uncertainty to its share
     (standard, x y z radius); `quality` holds what the gates looked at. `trace` is for the eye, in
     raw pixels: `rim` (n, 2), `ellipse` (k, 2) closed, `stripe` (m, 2), `chord` (2, 2) the points A
-    and B, `q` (2,), `centre` (2,).
+    and B, `q` (2,), `centre` (2,). `sources` holds the covariance (4, 4) behind each share.
     """
 
     method: str
@@ -29,6 +30,7 @@ class Located:
     budget: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
     quality: dict[str, float] = field(default_factory=dict)
     trace: dict[str, Array] = field(default_factory=dict)
+    sources: dict[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +69,10 @@ Outcome: TypeAlias = Measured | NotMeasured
 class Feature:
     """One hole, judged. Dictionaries go by axis (`x`, `y`, `z`, `d`), in mm, in the body frame
     after alignment; what is not controlled is absent from `nominal`, `deviation` and `tolerance`.
-    `uncertainty` is standard (k = 1). `outcome` is what the judgement was made from.
+    `uncertainty` is standard (k = 1). `outcome` is what the judgement was made from: its centre and
+    diameter are the raw values, before temperature, alignment and `offset` (the CMM correlation).
+    `bias` is measured minus the master body's CMM reference. `in_plane` and `along_normal` part the
+    whole deviation of the centre; `true_position` is the diameter of the zone that it needs.
     """
 
     id: str
@@ -83,6 +88,7 @@ class Feature:
     along_normal: float | None = None
     true_position: float | None = None
     bias: dict[str, float] = field(default_factory=dict)
+    offset: dict[str, float] = field(default_factory=dict)
 
     @property
     def reason(self) -> str | None:
@@ -92,8 +98,12 @@ class Feature:
 
 @dataclass(frozen=True, eq=False)
 class BodyResult:
-    """All features of a body, and what the alignment did (a 4x4 row list, residuals by datum)."""
+    """All features of a body, and what the alignment did (a 4x4 row list, residuals by datum).
 
-    verdict: Literal["in_tolerance", "out_of_tolerance", "uncertain", "incomplete"]
+    The verdict is out of tolerance where one feature is; else incomplete where one is not measured;
+    else uncertain where one is, or where body, base or sensor moved further than the job allows.
+    """
+
+    verdict: BodyVerdict
     features: tuple[Feature, ...]
     alignment: dict[str, Any] = field(default_factory=dict)
