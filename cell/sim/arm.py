@@ -1,0 +1,60 @@
+"""The true arm: where the flange really stands when the controller says that it stands there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cell.core.geometry import Array, Transform
+from cell.core.kinematics import Arm, arm_for
+from cell.sim.scene import ArmScene
+
+STANDING_RAD = 2e-5  # less than this between two readings is standing still
+
+
+class TrueArm:
+    """An arm with residual kinematics, hysteresis, imperfect repeatability and a warm-up.
+
+    It follows the joints as the controller reports them: the way a joint came decides the side of
+    its hysteresis, and every new standstill has an error of its own that stays while it stands.
+    """
+
+    def __init__(self, scene: ArmScene, seed: int) -> None:
+        self.model = arm_for(scene.model)
+        self.scene = scene
+        self._chance = np.random.default_rng([seed, *b"arm"])
+        self._true = _with_residuals(self.model, scene, self._chance)
+        self._hysteresis = np.radians(scene.hysteresis_deg) * self._chance.standard_normal(6)
+        self._came_from = np.ones(6)
+        self._last: Array | None = None
+        self._standstill = np.zeros(6)
+
+    def follow(self, joints: Array) -> None:
+        """Take note of the joints (6,) in rad that the controller reports now."""
+        if self._last is None:
+            self._last = joints.copy()
+        change = joints - self._last
+        turned = np.abs(change) > STANDING_RAD
+        if turned.any():
+            self._came_from[turned] = np.sign(change[turned])
+            self._standstill = (np.radians(self.scene.repeatability_deg)
+                                * self._chance.standard_normal(6))
+            self._last = joints.copy()
+
+    def flange(self, reported: Transform, joints: Array, time: float) -> Transform:
+        """Return the true base_from_flange for a reported one, `time` s after the cold start."""
+        if self.scene.ideal:
+            return reported
+        turned = joints + self._hysteresis * self._came_from + self._standstill
+        true = self._at(time).forward(turned)
+        return reported @ self.model.forward(joints).inverse @ true
+
+    def _at(self, time: float) -> Arm:
+        """Return the arm as warm as it is: links are shorter when cold."""
+        shorter = self.scene.cold_mm * float(np.exp(-time / self.scene.warm_up_s))
+        return self._true.with_residuals(a=(0.0, shorter, shorter, 0.0, 0.0, 0.0))  # a2, a3 < 0
+
+
+def _with_residuals(arm: Arm, scene: ArmScene, chance: np.random.Generator) -> Arm:
+    a, d = scene.length_mm * chance.standard_normal((2, 6))
+    alpha, theta = np.radians(scene.angle_deg) * chance.standard_normal((2, 6))
+    return arm.with_residuals(a=tuple(a), d=tuple(d), alpha=tuple(alpha), theta=tuple(theta))
