@@ -179,6 +179,7 @@ class Order:
     body_type: int = 0
     operator: str = ""
     reason: str = ""
+    body_present: bool = True
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ def test_a_month_of_bodies(url, capsys):
     found = trend(database, "H7", "x", Filter())
     database.close()
     with capsys.disabled():
-        print(f"\n{url.split(':')[0]}: {BODIES} bodies, {BODIES * HOLES} features in {written:.0f} s"
+        print(f"\n{url.split(':')[0]}: {BODIES} bodies, {BODIES * HOLES} features, {written:.0f} s"
               f" ({1000 * written / BODIES:.1f} ms a body); trend of {len(found)} points "
               f"{1000 * np.median(times):.0f} ms; last 100 bodies {1000 * listed:.0f} ms")
     assert len(found) == BODIES and [p.started for p in found] == sorted(p.started for p in found)
