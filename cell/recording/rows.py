@@ -1,0 +1,96 @@
+"""The rows of a recording file, whatever state it is in: the one place that reads with rerun."""
+
+from __future__ import annotations
+
+import tempfile
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+from rerun.chunk import LazyChunkStream, RrdReader
+
+from cell.core.errors import DocumentError
+from cell.recording.forms import Plain
+from cell.recording.framing import copy_whole, read_frame
+from cell.recording.layout import is_audited
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of one entity: its columns by name, and its place on the timelines."""
+
+    path: str
+    columns: dict[str, pa.Scalar]
+
+    def number(self, name: str) -> int | None:
+        """Return its place on a timeline, None where it has none."""
+        return self.columns[name].as_py() if name in self.columns else None
+
+    def first(self, name: str) -> Plain:
+        """Return the first value of a component, as plain values; None where it is absent."""
+        values = self.columns[name].values if name in self.columns else None
+        return values[0].as_py() if values is not None and len(values) else None
+
+    def blob(self, name: str) -> NDArray[np.uint8] | None:
+        """Return a component's bytes as a uint8 array that lies where they were read."""
+        values = self.columns[name].values if name in self.columns else None
+        return values[0].values.to_numpy() if values is not None and len(values) else None
+
+    @property
+    def name(self) -> str:
+        """The last part of the entity's path."""
+        return self.path.rpartition("/")[2]
+
+
+def read_rows(path: Path) -> Iterator[Row]:
+    """Read the audited rows of a recording in the order in which they were written.
+
+    A file that was cut is read up to its last whole message.
+
+    Raises:
+        DocumentError: it cannot be read, is no recording, or its content is damaged.
+    """
+    with _readable(path) as readable, damage_explained(path):
+        for chunk in _open(readable):
+            if is_audited(chunk.entity_path):
+                yield from _rows(chunk.entity_path, chunk.to_record_batch())
+
+
+def _rows(path: str, batch: pa.RecordBatch) -> Iterator[Row]:
+    for row in range(batch.num_rows):
+        yield Row(path, {name: batch.column(i)[row] for i, name in enumerate(batch.schema.names)})
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[Path]:
+    """Give the file itself where it was closed, else a copy of its whole messages."""
+    if read_frame(path).closed:
+        yield path
+        return
+    with tempfile.NamedTemporaryFile(suffix=".rrd") as copy:
+        copy_whole(path, copy)
+        yield Path(copy.name)
+
+
+def _open(path: Path) -> LazyChunkStream:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that there is no index: known, and said by the reader
+        reader = RrdReader(path)
+        (store,) = reader.recordings()
+        return reader.stream(store=store)
+
+
+@contextmanager
+def damage_explained(path: Path) -> Iterator[None]:
+    """Turn whatever a foreign parser raises over damaged content into one sentence."""
+    try:
+        yield
+    except DocumentError:
+        raise
+    except Exception as error:
+        raise DocumentError(f"is damaged: {error}", source=str(path)) from error

@@ -1,0 +1,41 @@
+"""What can change the last digits of a number: software, and the processor's features that numpy
+and OpenCV choose their kernels by.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from importlib.metadata import version
+
+import cv2
+import numpy as np
+
+from cell import __version__
+
+PACKAGES = ("numpy", "scipy", "rerun-sdk", "pyarrow", "pydantic")
+
+
+def collect_versions() -> dict[str, str]:
+    """Collect the versions that a start record holds, as texts by name."""
+    return {
+        "cell": __version__,
+        "python": platform.python_version(),
+        **{package: version(package) for package in PACKAGES},
+        "opencv": cv2.__version__,
+        "system": f"{platform.system()} {platform.machine()} {'-'.join(platform.libc_ver())}",
+        **_kernels(),
+    }
+
+
+def _kernels() -> dict[str, str]:
+    """What dispatch depends on: features found on this processor, and how libraries were built."""
+    built = np.show_config(mode="dicts")
+    blas = built["Build Dependencies"]["blas"]
+    return {
+        "numpy_features": " ".join(built["SIMD Extensions"].get("found", [])),
+        "numpy_baseline": " ".join(built["SIMD Extensions"].get("baseline", [])),
+        "blas": f"{blas.get('name')} {blas.get('version')}",
+        "opencv_features": cv2.getCPUFeaturesLine(),
+        "opencv_build": hashlib.sha256(cv2.getBuildInformation().encode()).hexdigest()[:16],
+    }
