@@ -7,8 +7,10 @@ import traceback
 from typing import Any
 
 import typer
+from rich.markup import escape
 
 from cell import __version__
+from cell.cli.check import check
 from cell.cli.study import study_app
 from cell.cli.words import console, print_json
 from cell.core.errors import BUG, INTERRUPTED, CellError
@@ -26,6 +28,7 @@ WRONG_WORDS: Any = typer.BadParameter.__mro__[2]  # the base of usage errors, wh
 REASONS = {2: "bad_input", 3: "device_fault", 4: "recording_failed"}
 
 app.add_typer(study_app)
+app.command()(check)
 
 
 @app.callback(invoke_without_command=True)
@@ -62,5 +65,5 @@ def _run() -> int:
 def _explain(error: CellError) -> int:
     if "--json" in sys.argv:
         print_json({"ok": False, "reason": REASONS[error.exit_code], "detail": str(error)})
-    console.print(f"[red]error:[/red] {error}", highlight=False, soft_wrap=True)
+    console.print(f"[red]error:[/red] {escape(str(error))}", highlight=False, soft_wrap=True)
     return error.exit_code

@@ -22,6 +22,8 @@ from cell.core.errors import DocumentError
 from cell.core.geometry import Transform
 from cell.core.kinematics import Arm
 from cell.core.ports import Joints
+from cell.metrology.align import check_alignment
+from cell.metrology.datum import UndeterminedError
 from cell.metrology.stop_pose import compute_pose, find_sight_problem, step_back
 from cell.metrology.way import Leg, Passage, check_leg, find_limit_problems, join_legs
 
@@ -57,9 +59,13 @@ def plan_stops(job: JobDocument, holes: Sequence[Hole], calibration: Calibration
     """Plan the stops of a job in their order, and check the whole way.
 
     Raises:
-        DocumentError: a stop is out of reach or limits, would not see its hole, or the way to it
-            is not free; names the stops and the reasons.
+        DocumentError: the datums do not hold the body; a stop is out of reach or limits, or would
+            not see its hole; or the way to it is not free. Names the stops and the reasons.
     """
+    try:
+        check_alignment(job.alignment, holes)
+    except UndeterminedError as loose:
+        raise DocumentError(str(loose), source=f"job {job.name}", place="alignment") from None
     plan = draw_plan(job, holes, calibration, station, arm)
     if plan.refusals:
         (hole, reason), *others = plan.refusals

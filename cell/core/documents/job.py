@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from cell.core.documents.base import Document, Number, Vector6
+from cell.core.documents.base import Document, Number, Vector3, Vector6
 from cell.core.documents.station import NotNegative, Positive
 
 Identifier = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
@@ -39,6 +39,17 @@ class Alignment(Document):
     method: Literal["fixture", "rps", "best_fit"] = "fixture"
     datums: dict[str, str] = Field(default_factory=dict)  # hole id -> axes of xyz that it holds
     limit_mm: Positive = 2.0
+
+
+class Thermal(Document):
+    """How the part's temperature is taken out: lengths from `fixed_point` (mm, body frame: where
+    the fixture holds the body) and diameters are scaled to 20 degrees C. The temperature entered
+    here counts where none is measured.
+    """
+
+    expansion_per_kelvin: Annotated[Number, Field(ge=0, le=1e-4)]  # steel 11.5e-6, aluminium 23e-6
+    part_temperature_c: Annotated[Number, Field(ge=-40, le=80)]
+    fixed_point: Vector3 = (0.0, 0.0, 0.0)
 
 
 class Decision(Document):
@@ -74,5 +85,6 @@ class JobDocument(Document):
     normal_sigma_deg: Positive = 0.35
     alignment: Alignment = Alignment()
     decision: Decision = Decision()
+    thermal: Thermal | None = None
     retry: Retry = Retry()
     stops: tuple[Stop, ...] = ()

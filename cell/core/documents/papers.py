@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -71,6 +72,11 @@ class Papers:
         return self._by_id[hole_id]
 
     @property
+    def planned_holes(self) -> tuple[Hole, ...]:
+        """The holes that the job measures, in its order."""
+        return tuple(self.hole(stop.hole) for stop in self.job.stops) or self.holes
+
+    @cached_property
     def _by_id(self) -> dict[str, Hole]:
         return {hole.id: hole for hole in self.holes}
 
