@@ -11,6 +11,8 @@ from rich.markup import escape
 
 from cell import __version__
 from cell.cli.check import check
+from cell.cli.locate import locate
+from cell.cli.sim import sim
 from cell.cli.study import study_app
 from cell.cli.words import console, print_json
 from cell.core.errors import BUG, INTERRUPTED, CellError
@@ -27,8 +29,10 @@ app = typer.Typer(
 WRONG_WORDS: Any = typer.BadParameter.__mro__[2]  # the base of usage errors, wherever click lives
 REASONS = {2: "bad_input", 3: "device_fault", 4: "recording_failed"}
 
+app.command()(locate)
 app.add_typer(study_app)
 app.command()(check)
+app.command()(sim)
 
 
 @app.callback(invoke_without_command=True)

@@ -76,8 +76,8 @@ class Sight:
     def of(cls, features: Rim | Stripe, camera: CameraModel) -> Sight:
         """Undistort the points of a rim or of a stripe."""
         rays = camera.rays(features.points)
-        by_pixel = np.linalg.inv(camera.pixel_by_normalised(rays[:, :2]))
-        return cls(rays, np.asarray(by_pixel, dtype=np.float64), features.sigma, max(1.0, features.correlation))
+        by_pixel = np.asarray(np.linalg.inv(camera.pixel_by_normalised(rays[:, :2])), np.float64)
+        return cls(rays, by_pixel, features.sigma, max(1.0, features.correlation))
 
     def pixel_gradient(self, by_ray: Array) -> tuple[Array, Array]:
         """Turn derivatives (n, 3) by the ray into mm per px (n,) and unit directions (n, 2)."""
