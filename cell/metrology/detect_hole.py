@@ -1,4 +1,8 @@
-"""Find the rim of a hole in the ring-light picture, to a fraction of a pixel."""
+"""Find the rim of a hole in the ring-light picture, to a fraction of a pixel.
+
+Rough edges by their slope, those that agree on an ellipse, then the grey profiles of these rays:
+hole, wall and sheet, with the wall that thickness and tilt predict.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +11,32 @@ import numpy as np
 from cell.core.geometry import Array
 from cell.core.observation import Image
 from cell.core.optics import CameraModel
-from cell.metrology.arrays import Grey
-from cell.metrology.edges import Band, Edges, find_edges, sample_band, smooth_around
+from cell.metrology.arrays import Grey, Mask
+from cell.metrology.edges import (
+    SMOOTHING,
+    Band,
+    Edges,
+    find_edges,
+    sample_band,
+    smooth_around,
+    spread,
+)
 from cell.metrology.ellipse import Ellipse
 from cell.metrology.features import Expected, Rim
 from cell.metrology.find_holes import Hole, find_holes
-from cell.metrology.gates import judge_rim
+from cell.metrology.gates import check_inside, check_whole
+from cell.metrology.profile import Profile, fit_profile, locate_edges
 from cell.metrology.reasons import refusal
 from cell.metrology.rim_fit import agree, settle
+from cell.metrology.spread import correlation_length, robust_sigma
+from cell.metrology.wall import predict_wall
 
-WIDE, NARROW = 8.0, 5.0  # px on either side of the rim that are looked at, first and last
+WIDE = 8.0             # px to either side, where edges are looked for first
+OUTWARD = 3.0          # px of sheet in a grey profile: more would add its texture
+INWARD = 3.0           # px of hole beyond the wall
+RAY_SPACING = 1.5      # px along the rim
+SHARP = 0.9            # px of blur by the lens, above which the edge itself may be rounded
+SMALL_ROUGHNESS = 0.25  # px from end to end, which texture alone gives
 
 
 def detect_hole(image: Image, camera: CameraModel, expected: Expected) -> Rim:
@@ -28,53 +48,75 @@ def detect_hole(image: Image, camera: CameraModel, expected: Expected) -> Rim:
     holes = find_holes(image, camera, expected)
     if not holes:
         raise refusal("no_hole")
-    return detect_rim(image, holes[0])
+    return detect_rim(image, holes[0], camera, expected)
 
 
-def detect_rim(image: Image, hole: Hole) -> Rim:
-    """Locate the rim of a hole that was found."""
-    _check_inside(image, hole.ellipse)
-    smooth = smooth_around(image, hole.ellipse, 0.25 * hole.ellipse.radius + 16.0)
-    _check_whole(smooth, hole)
-    rough = _fit(sample_rim(smooth, hole.ellipse, WIDE), hole, tolerance=3.0)[0]
-    band = sample_rim(smooth, rough, NARROW)
-    ellipse, edges, miss, scale = _fit(band, hole, tolerance=1.0)
-    good = np.abs(miss) < 3.0 * scale
-    t, normals = band.t[edges.ray], band.ellipse.normals(band.t[edges.ray])
-    points = band.ellipse.points(t) + edges.offset[:, None] * normals
-    x, y = map(float, ellipse.centre)
-    return Rim(points[good], -normals[good], scale, 4.0, (x, y, *ellipse.axes),
-               quality={"coverage": hole.coverage, "contrast": hole.contrast,
-                        "inside": float(hole.inside)})
+def detect_rim(image: Image, hole: Hole, camera: CameraModel, expected: Expected) -> Rim:
+    """Locate the rim of a hole that was found.
+
+    Raises:
+        UnmeasurableError: it is cut by the border, covered or not round.
+    """
+    check_inside(image, hole.ellipse)
+    smooth = smooth_around(image, hole.ellipse, 0.25 * hole.ellipse.radius + WIDE)
+    check_whole(smooth, hole)
+    rough, agreed = _rough_rim(smooth, hole)
+    wall = predict_wall(rough, camera, expected)
+    band = _profiles(smooth, rough, wall.widest)
+    rays = np.interp(band.t, *agreed, period=2.0 * np.pi) > 0.5
+    profile = fit_profile(band, rays, wall)
+    edge, misfit = locate_edges(band, profile)
+    good = rays & (misfit < 3.0 * np.median(misfit[rays])) & (np.abs(edge - profile.edge) < 2.0)
+    return _rim(band, edge, good, profile, hole)
 
 
-def sample_rim(smooth: Grey, ellipse: Ellipse, half_width: float) -> Band:
-    """Sample a profile for each pixel of the rim."""
-    rays = int(np.clip(2.0 * np.pi * ellipse.radius, 90, 720))
-    return sample_band(smooth, ellipse, half_width, rays=rays)
-
-
-def _fit(band: Band, hole: Hole, tolerance: float) -> tuple[Ellipse, Edges, Array, float]:
-    """Fit the edges that agree: the ellipse, those edges, their residuals and spread (px)."""
+def _rough_rim(smooth: Grey, hole: Hole) -> tuple[Ellipse, tuple[Array, Array]]:
+    """Fit the edges that agree: the ellipse, and where (t) it has one (1) and where not (0)."""
+    band = sample_band(smooth, hole.ellipse, spread(WIDE, 0.5), rays=_rays(hole.ellipse))
     edges = find_edges(band, hole.inside, 0.3 * hole.contrast)
-    _, close = agree(band, edges, tolerance)
-    agreed = edges[close]
-    ellipse, miss, scale = settle(band, agreed, floor=0.02)
-    return ellipse, agreed, miss, scale
+    _, close = agree(band, edges, tolerance=2.0)
+    ellipse, miss, scale = settle(band, edges[close], floor=0.02)
+    seen = edges.ray[close][np.abs(miss) < 3.0 * scale]
+    return ellipse, (band.t, np.isin(np.arange(len(band.t)), seen).astype(np.float64))
 
 
-def _check_inside(image: Image, ellipse: Ellipse) -> None:
-    height, width = image.shape
-    rim = ellipse.points(np.linspace(0.0, 2.0 * np.pi, 64))
-    if (rim < 1.0).any() or (rim > [width - 2.0, height - 2.0]).any():
-        raise refusal("hole_cut_by_border")
+def _profiles(smooth: Grey, rim: Ellipse, wall_width: float) -> Band:
+    inward = INWARD + np.clip(wall_width, 0.0, 0.3 * rim.radius)
+    offsets = np.arange(-np.ceil(inward), OUTWARD + 0.5)
+    return sample_band(smooth, rim, offsets, rays=_rays(rim))
 
 
-def _check_whole(smooth: Grey, hole: Hole) -> None:
-    radius = hole.ellipse.radius
-    band = sample_band(smooth, hole.ellipse, 0.22 * radius, rays=180)
-    edges = find_edges(band, hole.inside, 0.4 * hole.contrast)
-    seen = np.isin(np.arange(len(band.t)), edges.ray[np.abs(edges.offset) < 2.0])
-    reason = judge_rim(band, seen, radius)
-    if reason is not None:
-        raise refusal(reason, f"{seen.mean():.0%} of the rim follows an ellipse")
+def _rays(rim: Ellipse) -> int:
+    return int(np.clip(2.0 * np.pi * rim.radius / RAY_SPACING, 90, 400))
+
+
+def _rim(band: Band, edge: Array, good: Mask, profile: Profile, hole: Hole) -> Rim:
+    ray = np.nonzero(good)[0]
+    ellipse, miss, scale = settle(band, Edges(ray, edge[ray], edge[ray]), floor=0.01)
+    kept = np.abs(miss) < 3.5 * scale
+    normals = band.ellipse.normals(band.t[ray])
+    # A blurred disc looks smaller: its half level lies s**2 / 2R inside.
+    bend = profile.blur**2 / (2.0 * ellipse.radius)
+    points = band.ellipse.points(band.t[ray]) + (edge[ray] + bend)[:, None] * normals
+    x, y = map(float, ellipse.centre)
+    major, minor, angle = ellipse.axes
+    return Rim(points[kept], -normals[kept], robust_sigma(miss[kept]),
+               correlation_length(miss[kept]), (x, y, major + bend, minor + bend, angle),
+               ambiguity=_ambiguity(edge[good] - profile.edge[good], profile),
+               blur=profile.blur, quality=_quality(hole, profile, good))
+
+
+def _ambiguity(ripple: Array, profile: Profile) -> float:
+    """Say how far the visible edge may lie beside the bore's (px): burr and die roll show as a
+    ragged or a soft edge, and a wall draws the edge inward by more or less than was thought.
+    """
+    low, high = np.quantile(ripple, [0.025, 0.975])
+    soft = np.sqrt(max(profile.blur**2 - SMOOTHING**2, 0.0)) - SHARP
+    return float(max(high - low - SMALL_ROUGHNESS, 0.0) + 3.0 * max(soft, 0.0)
+                 + np.abs(profile.wall_pull).max() / 2.0)
+
+
+def _quality(hole: Hole, profile: Profile, good: Mask) -> dict[str, float]:
+    return {"coverage": float(good.mean()), "contrast": hole.contrast, "inside": float(hole.inside),
+            "blur_px": profile.blur, "wall_px": float(profile.width.max()),
+            "wall_pull_px": float(profile.wall_pull.max())}

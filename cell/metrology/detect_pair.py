@@ -31,9 +31,10 @@ def detect_pair(hole_image: Image, stripe_image: Image, sensor: SensorModel,
         if find_ridge(hole_image, upright=upright) is not None and _is_dark(stripe_image):
             raise refusal("images_swapped")
         raise refusal("no_laser")
-    holes = find_holes(hole_image, sensor.camera, _at_depth(expected, ridge, sensor))
+    placed = _at_depth(expected, ridge, sensor)
+    holes = find_holes(hole_image, sensor.camera, placed)
     hole = _crossed(holes, ridge)
-    rim = detect_rim(hole_image, hole)
+    rim = detect_rim(hole_image, hole, sensor.camera, placed)
     return rim, follow_stripe(stripe_image, ridge, rim, sensor, expected)
 
 

@@ -14,13 +14,13 @@ from cell.metrology.ellipse import Ellipse
 from cell.metrology.features import Expected, Rim, Stripe
 from cell.metrology.reasons import refusal
 from cell.metrology.ridge import Ridge, find_ridge, runs_upright
+from cell.metrology.spread import correlation_length, robust_sigma, tukey_weights
 
 DIE_ROLL = 0.7      # mm beside the rim, where a sheet of unknown thickness bends into the hole
 LENGTH = 12.0       # mm of stripe used on either side: the sheet is flat as far as that
 HALF_WINDOW = 10    # px across the stripe: four standard deviations of a wide one
 FLOOR = 0.2         # of the stripe's height, below which nothing counts towards its centre
 LEAST_LINES = 8     # on either side
-TUKEY = 4.685
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ def follow_stripe(image: Image, ridge: Ridge, rim: Rim, sensor: SensorModel,
     good = np.abs(miss) < 3.5 * scale
     step = float(np.median(miss[good & (side > 0)]) - np.median(miss[good & (side < 0)]))
     return Stripe(points=points[good], side=side[good], sigma=scale,
-                  correlation=_correlation(miss[good]),
+                  correlation=correlation_length(miss[good]),
                   quality={"height": ridge.height, "step": step, "share": ridge.share})
 
 
@@ -127,19 +127,9 @@ def _straightness(points: Array, camera: CameraModel, upright: bool) -> tuple[Ar
     focal = float(camera.matrix[0, 0] if upright else camera.matrix[1, 1])
     rows = np.column_stack([np.ones_like(along), along])
     miss, scale = across - np.median(across), 1.0
-    for step in range(8):
-        scale = max(1e-3 / focal, 1.4826 * float(np.median(np.abs(miss))))
-        weight = np.clip(1.0 - (miss / (TUKEY * scale)) ** 2, 0.0, None) if step else 1.0 + 0 * miss
+    for _ in range(8):
+        scale = max(1e-3 / focal, robust_sigma(miss))
+        weight = np.sqrt(tukey_weights(miss, scale))
         line = np.linalg.lstsq(rows * weight[:, None], across * weight, rcond=None)[0]
         miss = across - rows @ line
     return miss * focal, scale * focal
-
-
-def _correlation(miss: Array) -> float:
-    """Count the neighbours that share one error: the integral of the autocorrelation."""
-    centred = miss - miss.mean()
-    spectrum = np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2
-    product = np.fft.irfft(spectrum)[:min(30, len(centred))]
-    shares = product[1:] / max(product[0], 1e-12)
-    until = int(np.argmax(shares < 0.1)) if (shares < 0.1).any() else len(shares)
-    return float(1.0 + 2.0 * shares[:until].sum())

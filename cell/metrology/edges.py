@@ -53,14 +53,17 @@ class Edges:
         return Edges(self.ray[chosen], self.offset[chosen], self.strength[chosen])
 
 
-def sample_band(image: Image | Grey, ellipse: Ellipse, half_width: float, *, rays: int,
-                step: float = 0.5) -> Band:
-    """Sample the image along the normals of an ellipse, `half_width` px to either side.
+def spread(half_width: float, step: float) -> Array:
+    """Space offsets `step` apart, as far as `half_width` to either side."""
+    return np.arange(-half_width, half_width + step / 2.0, step)
+
+
+def sample_band(image: Image | Grey, ellipse: Ellipse, offsets: Array, rays: int) -> Band:
+    """Sample the image at `offsets` (m,) px along the outward normals of an ellipse.
 
     Bilinear; beyond the image the border's grey goes on.
     """
     t = np.linspace(0.0, 2.0 * np.pi, rays, endpoint=False)
-    offsets = np.arange(-half_width, half_width + step / 2.0, step)
     places = ellipse.points(t)[:, None] + offsets[:, None] * ellipse.normals(t)[:, None]
     x, y = np.moveaxis(places.astype(np.float32), -1, 0)
     grey = cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)

@@ -9,7 +9,7 @@ import numpy as np
 from cell.core.geometry import Array
 from cell.core.observation import Image
 from cell.core.optics import CameraModel
-from cell.metrology.edges import find_edges, sample_band, smooth_around
+from cell.metrology.edges import find_edges, sample_band, smooth_around, spread
 from cell.metrology.ellipse import Ellipse, project_circle
 from cell.metrology.features import Expected
 from cell.metrology.rim_fit import agree
@@ -76,7 +76,7 @@ def _look(image: Image, circle: Circle, expected: Expected, camera: CameraModel)
     start = _expected_ellipse(circle, camera, expected)
     smooth = smooth_around(image, start, 0.3 * circle.radius)
     step = max(0.5, circle.radius / 60.0)
-    band = sample_band(smooth, start, 0.22 * circle.radius, rays=RAYS, step=step)
+    band = sample_band(smooth, start, spread(0.22 * circle.radius, step), RAYS)
     steepest = float(np.median((-circle.inside * band.slope).max(axis=1)))
     edges = find_edges(band, circle.inside, 0.4 * steepest)
     if len(edges.ray) < 12:

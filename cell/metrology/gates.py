@@ -8,22 +8,40 @@ from __future__ import annotations
 
 import numpy as np
 
-from cell.metrology.arrays import Mask
-from cell.metrology.edges import Band
-from cell.metrology.reasons import Reason
+from cell.core.observation import Image
+from cell.metrology.arrays import Grey, Mask
+from cell.metrology.edges import Band, find_edges, sample_band, spread
+from cell.metrology.ellipse import Ellipse
+from cell.metrology.find_holes import Hole
+from cell.metrology.reasons import Reason, refusal
 
 COMPLETE = 0.75  # of the rim has to be seen
 BESIDE = 0.1     # of the radius, inside and outside the rim, where hole and metal are looked at
 
 
-def judge_rim(band: Band, seen: Mask, radius: float) -> Reason | None:
-    """Judge a rim by the profiles on which its edge was `seen` (n,) bool; None if complete.
+def check_inside(image: Image, rim: Ellipse) -> None:
+    """Refuse a hole that reaches beyond the image."""
+    height, width = image.shape
+    around = rim.points(np.linspace(0.0, 2.0 * np.pi, 64))
+    if (around < 1.0).any() or (around > [width - 2.0, height - 2.0]).any():
+        raise refusal("hole_cut_by_border")
 
-    Where the edge is missing, either the hole goes on beyond the rim (a slot), or metal lies
-    inside it (something covers the hole).
+
+def check_whole(smooth: Grey, hole: Hole) -> None:
+    """Refuse a rim of which too little is seen, with the reason that fits."""
+    radius = hole.ellipse.radius
+    band = sample_band(smooth, hole.ellipse, spread(0.22 * radius, 0.5), rays=180)
+    edges = find_edges(band, hole.inside, 0.4 * hole.contrast)
+    seen = np.isin(np.arange(len(band.t)), edges.ray[np.abs(edges.offset) < 2.0])
+    if seen.mean() < COMPLETE and seen.any():
+        raise refusal(_why_incomplete(band, seen, radius),
+                      f"{seen.mean():.0%} of the rim follows an ellipse")
+
+
+def _why_incomplete(band: Band, seen: Mask, radius: float) -> Reason:
+    """Judge a rim by the profiles on which its edge is missing: either the hole goes on beyond it
+    (a slot), or metal lies inside it (something covers the hole).
     """
-    if seen.mean() >= COMPLETE or not seen.any():
-        return None
     inner = band.grey[:, band.offsets < -BESIDE * radius].mean(axis=1)
     outer = band.grey[:, band.offsets > BESIDE * radius].mean(axis=1)
     hole, metal = float(np.median(inner[seen])), float(np.median(outer[seen]))

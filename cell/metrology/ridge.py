@@ -90,7 +90,8 @@ def _candidates(response: Grey) -> tuple[Array, Array, Array]:
     heights = np.where(summit, response[:, 1:-1], np.float32(0.0))
     column = np.argpartition(-heights, PEAKS, axis=1)[:, :PEAKS]
     line = np.repeat(np.arange(len(response)), PEAKS)
-    column, height = column.ravel(), np.take_along_axis(heights, column, axis=1).ravel().astype(np.float64)
+    height = np.take_along_axis(heights, column, axis=1).ravel().astype(np.float64)
+    column = column.ravel()
     real = height > 0.0
     return column[real].astype(np.float64) + 1.0, line[real].astype(np.float64), height[real]
 

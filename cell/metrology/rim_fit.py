@@ -8,9 +8,9 @@ from cell.core.geometry import Array
 from cell.metrology.arrays import Indices, Mask
 from cell.metrology.edges import Band, Edges
 from cell.metrology.ellipse import Ellipse
+from cell.metrology.spread import robust_sigma, tukey_weights
 
 DRAWS = 400
-TUKEY = 4.685  # of the biweight: 95 % efficient on Gaussian noise
 GOLDEN = 0.6180339887498949
 
 
@@ -54,12 +54,12 @@ def settle(band: Band, edges: Edges, *, floor: float,
     """
     rows = _design(band, free)[edges.ray]
     step: Array = np.zeros(free)
-    miss, scale = edges.offset, _spread(edges.offset)
+    miss, scale = edges.offset, 1.0
     for _ in range(8):
         miss = edges.offset - rows @ step
-        scale = max(floor, _spread(miss))
-        weight = np.clip(1.0 - (miss / (TUKEY * scale)) ** 2, 0.0, None)  # the biweight's root
-        step = np.linalg.lstsq(rows * weight[:, None], edges.offset * weight, rcond=None)[0]
+        scale = max(floor, robust_sigma(miss))
+        weight = np.sqrt(tukey_weights(miss, scale))
+        step = _solve(rows * weight[:, None], edges.offset * weight)
     return _moved(band.ellipse, step, free), edges.offset - rows @ step, scale
 
 
@@ -88,10 +88,6 @@ def _draws(ray: Indices, rays: int, free: int) -> Indices:
 
 
 def _solve(rows: Array, offset: Array) -> Array:
-    damped: Array = rows.swapaxes(1, 2) @ rows + 1e-9 * np.eye(rows.shape[2])
-    solved: Array = np.linalg.solve(damped, rows.swapaxes(1, 2) @ offset[..., None])[..., 0]
-    return solved
-
-
-def _spread(values: Array) -> float:
-    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
+    across = rows.swapaxes(-1, -2)
+    damped: Array = across @ rows + 1e-9 * np.eye(rows.shape[-1])
+    return np.asarray(np.linalg.solve(damped, across @ offset[..., None])[..., 0])
