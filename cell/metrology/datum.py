@@ -48,9 +48,9 @@ class Registration:
     (3,); it rests on the datums' `sigma`. `residuals` are registered minus nominal in body axes
     (mm), by datum and constrained axis; `free` the same along the axes that are not constrained.
     `redundancy` counts the constraints beyond six, and `chi2` is the sum of squared residuals over
-    `sigma`, by redundancy: some 1 where the datums' uncertainties are true. `left_out` tells by how much each datum's
-    constraints are missed (largest, mm) when it is left out of the fit; None where the rest does
-    not hold the body.
+    `sigma`, by redundancy: some 1 where the datums' uncertainties are true. `left_out` tells by how
+    much each datum's constraints are missed (largest, mm) when it is left out of the fit; None
+    where the rest does not hold the body.
     """
 
     body_from_measured: Transform
