@@ -11,6 +11,8 @@ from rich.markup import escape
 
 from cell import __version__
 from cell.cli.check import check
+from cell.cli.compare import compare
+from cell.cli.error_model import error_model
 from cell.cli.locate import locate
 from cell.cli.sim import sim
 from cell.cli.study import study_app
@@ -30,8 +32,10 @@ WRONG_WORDS: Any = typer.BadParameter.__mro__[2]  # the base of usage errors, wh
 REASONS = {2: "bad_input", 3: "device_fault", 4: "recording_failed"}
 
 app.command()(locate)
+app.command()(error_model)
 app.add_typer(study_app)
 app.command()(check)
+app.command()(compare)
 app.command()(sim)
 
 
