@@ -67,3 +67,9 @@ class Papers:
 @pytest.fixture
 def papers() -> Papers:
     return Papers(seed=7)
+
+
+@pytest.fixture(autouse=True)
+def _no_key(tmp_path, monkeypatch):
+    """Keep the tests away from the key of whoever runs them."""
+    monkeypatch.setenv("CELL_SEAL_KEY", str(tmp_path / "absent" / "seal.key"))

@@ -1,0 +1,105 @@
+"""Whether a recording is as it was closed: what was checked, what was not, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from cryptography.exceptions import UnsupportedAlgorithm
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+from cryptography.hazmat.primitives.serialization import load_pem_public_key
+
+from cell.core.errors import DocumentError
+from cell.recording.keys import is_signed_by, key_id
+from cell.recording.seal import Seal, read_seal, reference, seal_path
+
+
+@dataclass(frozen=True)
+class Check:
+    """One level of the integrity: `passed`, failed, or (None) not checked; `words` say it."""
+
+    level: str
+    passed: bool | None
+    words: str
+
+
+def check_seal(log: Path, trusted: Sequence[Ed25519PublicKey] = ()) -> tuple[Seal | None,
+                                                                            list[Check]]:
+    """Check a recording against its seal: the file, the signature, the link to the one before.
+
+    Args:
+        log: the recording.
+        trusted: keys that are known here; with none, a signature only shows its key's name.
+    """
+    path = seal_path(log)
+    if not path.exists():
+        return None, [Check("seal", None, "unsealed: there is no seal beside it")]
+    try:
+        seal = read_seal(path)
+    except DocumentError as error:
+        return None, [Check("seal", False, str(error))]
+    return seal, [_check_file(log, seal), _check_signature(seal, trusted), _check_link(log, seal)]
+
+
+def check_chain(seal: Seal | None, head: str, holes: int, faults: Sequence[str]) -> Check:
+    """Check what was recomputed from the content against what was written and sealed."""
+    if faults:
+        return Check("chain", False, "; ".join(faults))
+    if seal is None:
+        return Check("chain", True, f"{holes} holes follow from the start record; nothing sealed "
+                                    "says that they are all")
+    if (seal.chain, seal.holes) != (head, holes):
+        return Check("chain", False, f"the seal closes {seal.holes} holes and another content")
+    return Check("chain", True, f"start, {holes} holes and end follow from each other")
+
+
+def check_images(missing: int) -> Check:
+    """Say whether the pixels were there to be compared with their hashes."""
+    if missing:
+        return Check("images", None, f"{missing} images were pruned: their hashes are in the chain,"
+                                     " the pixels cannot be measured again")
+    return Check("images", True, "the pixels of every image fit their hash")
+
+
+def _check_file(log: Path, seal: Seal) -> Check:
+    found = reference(log)
+    if found.sha256 != seal.sha256:
+        return Check("file", False, "altered: its sha256 is not the sealed one")
+    if found.file != seal.file:
+        return Check("file", False, f"was sealed under the name {seal.file}")
+    return Check("file", True, f"{seal.size} bytes as sealed on {seal.sealed}")
+
+
+def _check_signature(seal: Seal, trusted: Sequence[Ed25519PublicKey]) -> Check:
+    if seal.signature is None:
+        return Check("signature", False if trusted else None,
+                     "none: the seal is made of hashes only, anyone can make another")
+    key = _key_in(seal)
+    if key is None or not is_signed_by(key, bytes.fromhex(seal.signature), seal.signed_bytes):
+        return Check("signature", False, "the seal was altered: its signature does not fit")
+    name = key_id(key)
+    if name in {key_id(known) for known in trusted}:
+        return Check("signature", True, f"by the known key {name}")
+    return Check("signature", False if trusted else None,
+                 f"by the key {name}, which is not known here: compare it with the cell's")
+
+
+def _key_in(seal: Seal) -> Ed25519PublicKey | None:
+    try:
+        key = load_pem_public_key((seal.public_key or "").encode())
+        bytes.fromhex(seal.signature or "")
+    except (ValueError, UnsupportedAlgorithm):
+        return None
+    return key if isinstance(key, Ed25519PublicKey) and key_id(key) == seal.key else None
+
+
+def _check_link(log: Path, seal: Seal) -> Check:
+    if seal.previous is None:
+        return Check("link", True, "the first seal of its folder")
+    previous = log.with_name(seal.previous.file)
+    if not previous.exists():
+        return Check("link", None, f"the seal before it, {previous.name}, is not here")
+    if reference(previous) != seal.previous:
+        return Check("link", False, f"the seal before it, {previous.name}, is another one now")
+    return Check("link", True, f"follows {previous.name}")
