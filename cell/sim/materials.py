@@ -102,8 +102,8 @@ def _crystals(chance: np.random.Generator) -> NDArray[np.int32]:
 
 def _noise(chance: np.random.Generator, along: float, across: float) -> Tile:
     """Return noise of unit variance, smooth over `along` columns and `across` rows, periodic."""
-    white = chance.standard_normal((TILE, TILE), dtype=np.float32)
-    wide = cv2.copyMakeBorder(white, *(TILE // 2,) * 4, cv2.BORDER_WRAP)
-    smooth = cv2.GaussianBlur(wide, (0, 0), sigmaX=along, sigmaY=across)
-    tile = smooth[TILE // 2:-TILE // 2, TILE // 2:-TILE // 2]
-    return tile / tile.std()
+    white = np.fft.rfft2(chance.standard_normal((TILE, TILE), dtype=np.float32))
+    down = np.fft.fftfreq(TILE)[:, None] * across
+    right = np.fft.rfftfreq(TILE)[None, :] * along
+    tile = np.fft.irfft2(white * np.exp(-2.0 * np.pi**2 * (down**2 + right**2)))
+    return (tile / tile.std()).astype(np.float32)

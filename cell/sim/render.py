@@ -62,7 +62,8 @@ def _layers(lens: Lens, setting: Setting, camera_from_base: Transform,
     camera_from_fixture = camera_from_base @ setting.base_from_fixture
     seen = [render_sheet(lens, lamps, camera_from_fixture @ sheet.fixture_from_sheet, sheet)
             for sheet in sheets]
-    seen += [render_board(lens, lamps, camera_from_base @ Transform(np.array(board.base_from_board)),
-                          board) for board in setting.boards]
+    for board in setting.boards:
+        camera_from_board = camera_from_base @ Transform(np.array(board.base_from_board))
+        seen.append(render_board(lens, lamps, camera_from_board, board))
     seen += [render_sphere(lens, lamps, camera_from_base, sphere) for sphere in setting.spheres]
     return [layer for layer in seen if layer is not None]

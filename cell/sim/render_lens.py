@@ -58,6 +58,10 @@ class Lens:
         return Rays(np.ascontiguousarray(normalised[..., 0]),
                     np.ascontiguousarray(normalised[..., 1]))
 
+    def prepare(self) -> None:
+        """Work out everything that is worked out once, before the first image needs it."""
+        _ = self.rays, self.coarse_rays, self._slopes, self._vignette
+
     @cached_property
     def coarse_rays(self) -> Rays:
         """The rays of a coarse lattice over the image, margins included."""

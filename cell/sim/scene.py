@@ -48,6 +48,13 @@ class SensorScene(Document):
     speckle: Magnitude = 1.0
 
 
+class Wiring(Document):
+    """Which standard digital output of the robot feeds which lamp."""
+
+    ring: Annotated[int, Field(ge=0, le=15)] = 0
+    laser: Annotated[int, Field(ge=0, le=15)] = 1
+
+
 class SensorErrors(Document):
     """Standard errors of the believed sensor: a relative focal length, px, mm, degrees."""
 
@@ -167,6 +174,7 @@ class SceneDocument(Document):
     seed: int
     master: int
     sensor: SensorScene
+    wiring: Wiring = Wiring()
     sensor_errors: SensorErrors = SensorErrors()
     flange_from_camera: Matrix4
     hand_eye_errors: PoseErrors = PoseErrors()
