@@ -26,6 +26,8 @@ from numpy.typing import ArrayLike
 
 from cell.core.geometry import Array, Plane
 
+WELL_CROSSED = 0.8  # of the radius: how far from the centre the stripe may pass
+
 
 @dataclass(frozen=True)
 class SensorGeometry:
@@ -77,23 +79,60 @@ def two_step_error(light_plane: Plane, centre: ArrayLike, normal: ArrayLike,
                    radius: float) -> Array:
     """Compute what the two-step method errs by in x, y, z and the radius (..., 4), mm, at any tilt.
 
-    To second order in the tilt. The ray to the ellipse's centre passes r² sin t cos t / d beside
-    the circle's centre, t being the angle between normal and viewing ray and d the distance.
+    Exact but for the radius, which is so to the second order of the error of the centre.
     """
     c = np.asarray(centre, dtype=np.float64)
     to_chord = chord_midpoint_error(light_plane, c, normal)
-    error = c * to_chord[..., 2:] / c[..., 2:] + _eccentricity(c, normal, radius)
+    beside = _eccentricity(c, normal, radius)
+    error = beside + (c + beside) * to_chord[..., 2:] / c[..., 2:]
     chordwise = np.sum(to_chord * error, axis=-1, keepdims=True)
     square = np.sum(error * error, axis=-1, keepdims=True)
     return np.concatenate([error, (square / 2.0 - chordwise) / radius], axis=-1)
 
 
+@dataclass(frozen=True)
+class Ranges:
+    """How far x_d, y_d, z_d (mm) and the tilt (rad) may lie from zero, either way."""
+
+    x: float = 5.0
+    y: float = 5.0
+    z: float = 5.0
+    tilt: float = float(np.radians(2.0))
+
+
+def paper_extremes(sensor: SensorGeometry, ranges: Ranges) -> Array:
+    """Find the largest |dx|, |dy| and |dz| (3,) in mm that (17), (20) and (15) allow."""
+    ends = [np.array([-1.0, 0.0, 1.0]) * reach for reach in (ranges.x, ranges.y, ranges.z)]
+    x_d, y_d, z_d, beta = np.meshgrid(*ends, np.array([-1.0, 1.0]) * ranges.tilt)
+    errors = [error_x(sensor, x_d, z_d, beta), error_y(sensor, (x_d, y_d, z_d), beta),
+              error_z(sensor, x_d, z_d, beta)]
+    return np.array([np.abs(error).max() for error in errors])
+
+
+def general_extremes(light_plane: Plane, ranges: Ranges, radius: float) -> Array:
+    """Find the largest errors of x, y, z and the radius (4,) in mm for a tilt in any direction.
+
+    Counted are holes that the stripe crosses well: within `WELL_CROSSED` of the radius.
+    """
+    steps = np.linspace(-1.0, 1.0, 9)
+    L = SensorGeometry.from_light_plane(light_plane).L
+    x, y, z, way = np.meshgrid(steps * ranges.x, steps * ranges.y, L + steps * ranges.z,
+                               np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False))
+    centre = np.stack([x, y, z], axis=-1)
+    flat, steep = np.sin(ranges.tilt), -np.cos(ranges.tilt)
+    normal = np.stack([flat * np.cos(way), flat * np.sin(way), np.full_like(way, steep)], axis=-1)
+    away = np.linalg.norm(chord_midpoint_error(light_plane, centre, normal), axis=-1)
+    errors = np.abs(two_step_error(light_plane, centre, normal, radius))
+    return np.asarray(errors[away < WELL_CROSSED * radius].max(axis=0))
+
+
 def _eccentricity(c: Array, normal: ArrayLike, radius: float) -> Array:
-    """How far the back-projected centre of the ellipse lies from the circle's, at equal z."""
+    """How far the ellipse's centre, carried to the circle's z, lies from the circle's centre.
+
+    The circle's dual conic is C Cᵀ - r² (I - n nᵀ); its product with the z axis is the ray to the
+    ellipse's centre.
+    """
     n = np.asarray(normal, dtype=np.float64)
     n = n / np.linalg.norm(n, axis=-1, keepdims=True)
-    distance = np.linalg.norm(c, axis=-1, keepdims=True)
-    view = c / distance
-    cosine = np.sum(view * n, axis=-1, keepdims=True)
-    shift = radius**2 * cosine * (n - view * cosine) / distance
-    return np.asarray(shift - view * shift[..., 2:] / view[..., 2:])
+    ray = c * c[..., 2:] - radius**2 * (np.array([0.0, 0.0, 1.0]) - n * n[..., 2:])
+    return np.asarray(ray * c[..., 2:] / ray[..., 2:] - c)
