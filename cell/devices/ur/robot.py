@@ -26,7 +26,6 @@ MM_PER_M = 1000.0
 ANSWER_SECONDS = 3.0       # for a question
 REST_SECONDS = 1.5         # that braking may take
 STILL = 1e-3               # rad/s
-LONGEST_MOVE = 600.0       # s; the worker has the move's own deadline
 MODEL_MM, MODEL_DEG = 20.0, 2.0  # a calibrated arm is nearer to its published kinematics
 SPARE_FACTOR, SPARE_SECONDS = 1.5, 3.0  # of a move's deadline over its computed duration
 
@@ -74,10 +73,11 @@ class UrRobot:
         """
         for move in path:
             _check_move(move)
-        state = self.state()
+        cycle = self._ask("state", ANSWER_SECONDS)
         for move in path:
-            state = self._go(move, state)
-        return state
+            cycle = self._go(move, cycle)
+            self._verify(move, self._read_state(cycle))
+        return self._read_state(cycle)
 
     def state(self) -> RobotState:
         """Read a cycle of the controller that came after the question."""
@@ -188,24 +188,24 @@ class UrRobot:
 
     # --- moving -----------------------------------------------------------------------------------
 
-    def _go(self, move: Move, start: RobotState) -> RobotState:
-        seconds = _duration(move, start.joints) * SPARE_FACTOR / self.speed + SPARE_SECONDS
-        tolerance = math.radians(self._settings.arrival_deg)
-        answer = self._ask("move", LONGEST_MOVE, joints=list(move.joints), speed=move.speed,
-                           acceleration=move.acceleration, tolerance=tolerance, seconds=seconds)
-        return self._verified(move, self._read_state(answer))
+    def _go(self, move: Move, cycle: dict[str, Any]) -> dict[str, Any]:
+        """Have one move made and return the cycle in which the arm had arrived."""
+        slowed = self.speed * max(float(cycle["speed_fraction"]), 0.01)  # the pendant's slider
+        seconds = _duration(move, cycle["joints"]) * SPARE_FACTOR / slowed + SPARE_SECONDS
+        return self._ask("move", seconds + ANSWER_SECONDS, joints=list(move.joints),
+                         speed=move.speed, acceleration=move.acceleration, seconds=seconds,
+                         tolerance=math.radians(self._settings.arrival_deg))
 
-    def _verified(self, move: Move, state: RobotState) -> RobotState:
+    def _verify(self, move: Move, state: RobotState) -> None:
         """Believe an arrival only if the flange stands where the joints were sent, at rest."""
         wanted, reached = self._arm.forward(move.joints), self._arm.forward(state.joints)
         millimetres, radians = wanted.distance(reached)
         near = (millimetres <= self._settings.arrival_mm
                 and math.degrees(radians) <= self._settings.arrival_deg)
-        if near and state.still:
-            return state
-        raise self._give_up(DeviceError(
-            f"did not arrive: {millimetres:.3f} mm and {math.degrees(radians):.3f} degrees off",
-            device="robot"))
+        if not near or not state.still:
+            raise self._give_up(DeviceError(
+                f"did not arrive: {millimetres:.3f} mm and {math.degrees(radians):.3f} degrees off",
+                device="robot"))
 
     # --- reading ----------------------------------------------------------------------------------
 

@@ -101,16 +101,16 @@ class Worker:
         before = self._control.getAsyncOperationProgressEx().operationId()
         if not self._control.moveJ(joints, speed, acceleration, True):
             raise RuntimeError("the control program did not take the move")
-        left, rested, last = seconds, 0.0, time.monotonic()
+        rested, last = 0.0, time.monotonic()
+        deadline = last + seconds
         while not self._arrived(joints, tolerance, before):
             self._check_playing()
             self._kick()
             time.sleep(POLL)
             step = time.monotonic() - last
             last += step
-            left -= step * max(self._receive.getTargetSpeedFraction(), 0.01)  # the pendant's slider
             rested = rested + step if self._ended(before) else 0.0
-            if left < 0.0 or rested > ENDED_EARLY:
+            if last > deadline or rested > ENDED_EARLY:
                 raise RuntimeError("the arm did not reach its goal in time")
         return self._snapshot()
 
@@ -158,7 +158,7 @@ class Worker:
                 "robot_mode": receive.getRobotMode(), "safety_mode": receive.getSafetyMode(),
                 "safety_bits": receive.getSafetyStatusBits(),
                 "temperatures": receive.getJointTemperatures(),
-                "outputs": receive.getActualDigitalOutputBits()}
+                "speed_fraction": receive.getTargetSpeedFraction()}
         return cycle
 
     # --- staying alive ----------------------------------------------------------------------------

@@ -2,8 +2,9 @@
 
 A line in, a line out. Switches take `on` or `off`: safeguard, emergency_stop, local_mode,
 freeze_stream (no cyclic data), stall (the same cycle again and again), freeze (nothing is read or
-answered: a pulled cable), refuse_upload. Events: protective_stop, pause, kill_program, cut (every
-client's connection ends), garbage, half_package, die, truth (answers JSON).
+answered: a pulled cable), refuse_upload. Events: protective_stop, pause, kill_program, other_tcp
+(100 mm further out), cut (every client's connection ends), garbage, half_package, die, truth
+(answers JSON).
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ import json
 import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 if TYPE_CHECKING:
     from cell.sim.controller.server import Server
@@ -33,6 +36,7 @@ class Referee:
         self._events: dict[str, Callable[[], None]] = {
             "protective_stop": controller.protective_stop, "pause": controller.pause,
             "kill_program": controller.end_program, "cut": server.cut,
+            "other_tcp": lambda: controller.set_tcp(np.array([0.0, 0.0, 0.1, 0.0, 0.3, 0.0])),
             "garbage": lambda: server.broadcast(os.urandom(64)),
             "half_package": lambda: server.broadcast(b"\x01\x00U\x01half"),
             "die": lambda: os._exit(1),
