@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 import pytest
+from made_workplace import Workplace
 
 
 @pytest.fixture(scope="session")
@@ -14,3 +15,10 @@ def test_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no reference data in {folder}: set CELL_TEST_DATA")
     return folder
+
+
+@pytest.fixture
+def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workplace:
+    """A working folder with a copy of the demo's documents; the test runs in it."""
+    monkeypatch.chdir(tmp_path)
+    return Workplace.in_folder(tmp_path)

@@ -52,7 +52,7 @@ def _sentence(fault: Mapping[str, Any], model: type[BaseModel], value: object, p
     kind, location = fault["type"], fault["loc"]
     if kind == "missing":
         return (f"the key {location[-1]!r} is missing" if isinstance(location[-1], str)
-                else f"expected a longer list: its entry [{location[-1]}] is missing")
+                else f"expected a longer list; came {_came(fault['input'])}")
     if kind == "extra_forbidden":
         return _unknown(str(location[-1]), _keys(model, location[:-1]))
     if not path and not isinstance(value, dict):

@@ -35,7 +35,8 @@ class RobotSettings(Document):
 
 class CameraSettings(Document):
     """The camera. `driver: sim` looks at the scene of `scene`; `driver: video` opens `source` (an
-    index, a device or a stream address) through OpenCV.
+    index, a device or a stream address) through OpenCV. `stale_s` is how old an image of a video
+    source may be when it arrives: its exposure, transfer and buffers.
     """
 
     driver: Literal["sim", "video"]
@@ -44,6 +45,7 @@ class CameraSettings(Document):
     exposure_ring_s: Positive = 0.008
     exposure_laser_s: Positive = 0.004
     timeout_s: Positive = 2.0
+    stale_s: NotNegative = 0.3
 
 
 class Box(Document):

@@ -107,12 +107,17 @@ class _Dumper(yaml.SafeDumper):
         flat = not any(isinstance(item, tuple | list | dict) for item in row)
         return self.represent_sequence(YAML + "seq", row, flow_style=flat)
 
+    def represent_text(self, text: str) -> yaml.Node:
+        style = None if text.isprintable() else '"'  # where line ends and the like are escaped
+        return self.represent_scalar(YAML + "str", text, style)
+
 
 for _name, (_pattern, _first) in SCHEMA.items():
     _Loader.add_implicit_resolver(YAML + _name, _pattern, _first)
     _Dumper.add_implicit_resolver(YAML + _name, _pattern, _first)
 _Dumper.add_representer(tuple, _Dumper.represent_row)
 _Dumper.add_representer(list, _Dumper.represent_row)
+_Dumper.add_representer(str, _Dumper.represent_text)
 
 
 def _value(node: yaml.Node, path: Path, lines: dict[Path, int], source: str) -> object:
