@@ -1,0 +1,39 @@
+import os
+import re
+from pathlib import Path
+
+import pytest
+
+from cell.archive.logs import check_logs, new_log
+from cell.core.errors import DocumentError
+
+
+def test_a_log_is_named_by_time_and_chance(tmp_path):
+    names = {new_log(tmp_path / "logs", "demo").name for _ in range(20)}
+    assert len(names) == 20
+    assert all(re.fullmatch(r"demo_\d{4}-\d\d-\d\dT\d{6}Z_[0-9a-f]{8}\.rrd", name)
+               for name in names)
+
+
+def test_trying_the_folder_leaves_nothing_in_it(tmp_path):
+    check_logs(tmp_path / "a" / "logs")
+    assert list((tmp_path / "a" / "logs").iterdir()) == []
+
+
+def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
+    (tmp_path / "logs").write_text("")
+    with pytest.raises(DocumentError, match="logs: expected a folder"):
+        check_logs(tmp_path / "logs")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="nothing is forbidden to root")
+def test_a_folder_that_cannot_be_written_is_refused(tmp_path):
+    tmp_path.chmod(0o555)
+    with pytest.raises(DocumentError, match="cannot be written"):
+        check_logs(tmp_path / "logs")
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="this system has no /proc")
+def test_a_folder_that_takes_no_files_is_refused():
+    with pytest.raises(DocumentError, match="recordings cannot be written here"):
+        check_logs(Path("/proc/self/fdinfo"))
