@@ -11,16 +11,9 @@ import numpy as np
 from cell.core.geometry import Array
 from cell.core.observation import Image
 from cell.core.optics import CameraModel
-from cell.metrology.arrays import Grey, Mask
-from cell.metrology.edges import (
-    SMOOTHING,
-    Band,
-    Edges,
-    find_edges,
-    sample_band,
-    smooth_around,
-    spread,
-)
+from cell.metrology.arrays import Mask
+from cell.metrology.band import SMOOTHING, Band, Patch, sample_band, spread
+from cell.metrology.edges import Edges, find_edges
 from cell.metrology.ellipse import Ellipse
 from cell.metrology.features import Expected, Rim
 from cell.metrology.find_holes import Hole, find_holes
@@ -34,7 +27,7 @@ from cell.metrology.wall import predict_wall
 WIDE = 8.0             # px to either side, where edges are looked for first
 OUTWARD = 3.0          # px of sheet in a grey profile: more would add its texture
 INWARD = 3.0           # px of hole beyond the wall
-RAY_SPACING = 1.5      # px along the rim
+ROUGH_SPACING, SPACING = 3.0, 1.5  # px along the rim
 SHARP = 0.9            # px of blur by the lens, above which the edge itself may be rounded
 SMALL_ROUGHNESS = 0.25  # px from end to end, which texture alone gives
 
@@ -45,10 +38,11 @@ def detect_hole(image: Image, camera: CameraModel, expected: Expected) -> Rim:
     Raises:
         UnmeasurableError: there is none, or it is cut by the border, covered or not round.
     """
-    holes = find_holes(image, camera, expected)
+    holes = list(find_holes(image, camera, expected))
     if not holes:
         raise refusal("no_hole")
-    return detect_rim(image, holes[0], camera, expected)
+    best = max(holes, key=lambda hole: hole.coverage * hole.contrast**0.5)
+    return detect_rim(image, best, camera, expected)
 
 
 def detect_rim(image: Image, hole: Hole, camera: CameraModel, expected: Expected) -> Rim:
@@ -58,11 +52,10 @@ def detect_rim(image: Image, hole: Hole, camera: CameraModel, expected: Expected
         UnmeasurableError: it is cut by the border, covered or not round.
     """
     check_inside(image, hole.ellipse)
-    smooth = smooth_around(image, hole.ellipse, 0.25 * hole.ellipse.radius + WIDE)
-    check_whole(smooth, hole)
-    rough, agreed = _rough_rim(smooth, hole)
+    check_whole(hole)
+    rough, agreed = _rough_rim(hole)
     wall = predict_wall(rough, camera, expected)
-    band = _profiles(smooth, rough, wall.widest)
+    band = _profiles(hole.patch, rough, wall.widest)
     rays = np.interp(band.t, *agreed, period=2.0 * np.pi) > 0.5
     profile = fit_profile(band, rays, wall)
     edge, misfit = locate_edges(band, profile)
@@ -70,24 +63,25 @@ def detect_rim(image: Image, hole: Hole, camera: CameraModel, expected: Expected
     return _rim(band, edge, good, profile, hole)
 
 
-def _rough_rim(smooth: Grey, hole: Hole) -> tuple[Ellipse, tuple[Array, Array]]:
+def _rough_rim(hole: Hole) -> tuple[Ellipse, tuple[Array, Array]]:
     """Fit the edges that agree: the ellipse, and where (t) it has one (1) and where not (0)."""
-    band = sample_band(smooth, hole.ellipse, spread(WIDE, 0.5), rays=_rays(hole.ellipse))
+    rays = _rays(hole.ellipse, ROUGH_SPACING)
+    band = sample_band(hole.patch, hole.ellipse, spread(WIDE, 0.5), rays)
     edges = find_edges(band, hole.inside, 0.3 * hole.contrast)
-    _, close = agree(band, edges, tolerance=2.0)
-    ellipse, miss, scale = settle(band, edges[close], floor=0.02)
-    seen = edges.ray[close][np.abs(miss) < 3.0 * scale]
-    return ellipse, (band.t, np.isin(np.arange(len(band.t)), seen).astype(np.float64))
+    agreed = edges[agree(band, edges, tolerance=2.0)[1]]
+    ellipse, miss, scale = settle(band, agreed, floor=0.02)
+    seen = agreed[np.abs(miss) < 3.0 * scale].rays(rays)
+    return ellipse, (band.t, seen.astype(np.float64))
 
 
-def _profiles(smooth: Grey, rim: Ellipse, wall_width: float) -> Band:
+def _profiles(patch: Patch, rim: Ellipse, wall_width: float) -> Band:
     inward = INWARD + np.clip(wall_width, 0.0, 0.3 * rim.radius)
     offsets = np.arange(-np.ceil(inward), OUTWARD + 0.5)
-    return sample_band(smooth, rim, offsets, rays=_rays(rim))
+    return sample_band(patch, rim, offsets, _rays(rim, SPACING))
 
 
-def _rays(rim: Ellipse) -> int:
-    return int(np.clip(2.0 * np.pi * rim.radius / RAY_SPACING, 90, 400))
+def _rays(rim: Ellipse, spacing: float) -> int:
+    return int(np.clip(2.0 * np.pi * rim.radius / spacing, 90, 400))
 
 
 def _rim(band: Band, edge: Array, good: Mask, profile: Profile, hole: Hole) -> Rim:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from cell.metrology.detect_hole import detect_rim
 from cell.metrology.detect_stripe import crosses, follow_stripe
 from cell.metrology.features import Expected, Rim, Stripe
 from cell.metrology.find_holes import Hole, find_holes
+from cell.metrology.gates import COMPLETE
 from cell.metrology.reasons import refusal
 from cell.metrology.ridge import Ridge, find_ridge, runs_upright
 
@@ -47,13 +49,20 @@ def _at_depth(expected: Expected, ridge: Ridge, sensor: SensorModel) -> Expected
     return replace(expected, centre=np.median(on_sheet, axis=0), centre_sigma=ANYWHERE)
 
 
-def _crossed(holes: list[Hole], ridge: Ridge) -> Hole:
-    if not holes:
-        raise refusal("no_hole")
+def _crossed(holes: Iterable[Hole], ridge: Ridge) -> Hole:
+    """Choose the hole that the stripe crosses: the first whole one, else the most complete."""
+    crossed: Hole | None = None
+    missed = False
     for hole in holes:
-        if crosses(ridge, hole.ellipse) and hole.coverage > 0.7 * holes[0].coverage:
+        if not crosses(ridge, hole.ellipse):
+            missed |= hole.coverage > COMPLETE
+        elif hole.coverage > COMPLETE:
             return hole
-    raise refusal("laser_misses_hole")
+        elif crossed is None or hole.coverage > crossed.coverage:
+            crossed = hole
+    if crossed is None:
+        raise refusal("laser_misses_hole" if missed else "no_hole")
+    return crossed
 
 
 def _is_dark(image: Image) -> bool:

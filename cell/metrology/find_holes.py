@@ -1,15 +1,17 @@
-"""Where holes are in the ring-light picture, roughly."""
+"""Where holes are in the ring-light picture, roughly: places that edges vote for, looked at."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cell.core.geometry import Array
 from cell.core.observation import Image
 from cell.core.optics import CameraModel
-from cell.metrology.edges import find_edges, sample_band, smooth_around, spread
+from cell.metrology.band import Patch, sample_band, smooth_around, spread
+from cell.metrology.edges import find_edges
 from cell.metrology.ellipse import Ellipse, project_circle
 from cell.metrology.features import Expected
 from cell.metrology.rim_fit import agree
@@ -17,31 +19,39 @@ from cell.metrology.voting import Circle, vote_for_circles
 
 SMALLEST_RADIUS = 14.0  # px, of a hole that nothing is known of
 RAYS = 120
-LEAST_COVERAGE = 0.5    # of the rim, to be a hole at all
+MARGIN = 0.25           # of the radius, on either side of the rim, that is looked at
+LEAST_COVERAGE = 0.4    # of the rim, to be a hole at all
+EDGE_WIDTH = 2.5        # px over which the step of a sharp edge extends
 
 
 @dataclass(frozen=True, eq=False)
 class Hole:
     """A hole as the search knows it: a rough `ellipse`, `inside` (-1 darker, +1 brighter than the
-    metal), the share of its rim that was seen (`coverage`) and the `contrast` there (grey/px).
+    metal), the share of its rim that was seen (`coverage`), the `contrast` there (grey/px) and the
+    `patch` of the image around it.
     """
 
     ellipse: Ellipse
     inside: int
     coverage: float
     contrast: float
+    patch: Patch
 
 
-def find_holes(image: Image, camera: CameraModel, expected: Expected) -> list[Hole]:
-    """Find the holes of an image, the most complete first."""
-    region = _region(camera, expected)
-    part = image[region[1]:region[3], region[0]:region[2]]
+def find_holes(image: Image, camera: CameraModel, expected: Expected) -> Iterator[Hole]:
+    """Find the holes of an image one after the other: the darker ones, then the brighter ones,
+    those with the most votes first.
+    """
+    left, top, right, bottom = _region(camera, expected)
+    part = image[top:bottom, left:right]
     octaves = _octaves(camera, expected, min(part.shape))
-    found = [_look(image, _shifted(circle, region), expected, camera)
-             for inside in (-1, +1) for radii in octaves
-             for circle in vote_for_circles(part, radii, inside)]
-    holes = [hole for hole in found if hole is not None and hole.coverage >= LEAST_COVERAGE]
-    return sorted(holes, key=lambda hole: -hole.coverage * hole.contrast**0.5)
+    for inside in (-1, +1):
+        circles = [circle for radii in octaves for circle in vote_for_circles(part, radii, inside)]
+        for circle in sorted(circles, key=lambda circle: -circle.votes):
+            placed = replace(circle, x=circle.x + left, y=circle.y + top)
+            hole = _look(image, placed, expected, camera)
+            if hole is not None:
+                yield hole
 
 
 def _region(camera: CameraModel, expected: Expected) -> tuple[int, int, int, int]:
@@ -66,27 +76,27 @@ def _octaves(camera: CameraModel, expected: Expected, size: int) -> list[Array]:
     return [start * 2.0 ** np.arange(0.0, 1.0, 1.0 / 6.0) for start in starts if 2 * start < size]
 
 
-def _shifted(circle: Circle, region: tuple[int, int, int, int]) -> Circle:
-    return Circle(circle.x + region[0], circle.y + region[1], circle.radius, circle.inside,
-                  circle.votes)
-
-
 def _look(image: Image, circle: Circle, expected: Expected, camera: CameraModel) -> Hole | None:
-    """Look closer at a place that was voted for."""
+    """Look closer at a place that was voted for; None where it is no hole."""
     start = _expected_ellipse(circle, camera, expected)
-    smooth = smooth_around(image, start, 0.3 * circle.radius)
+    patch = smooth_around(image, start, 2.0 * MARGIN * circle.radius)
     step = max(0.5, circle.radius / 60.0)
-    band = sample_band(smooth, start, spread(0.22 * circle.radius, step), RAYS)
+    band = sample_band(patch, start, spread(MARGIN * circle.radius, step), RAYS)
     steepest = float(np.median((-circle.inside * band.slope).max(axis=1)))
-    edges = find_edges(band, circle.inside, 0.4 * steepest)
-    if len(edges.ray) < 12:
+    edges = find_edges(band, circle.inside, max(0.4 * steepest, 1e-3))
+    if len(edges.ray) < LEAST_COVERAGE * RAYS:
         return None
     ellipse, close = agree(band, edges, max(1.0, 0.02 * circle.radius),
                            free=3 if expected.normal is not None else 5)
-    if not 0.6 < ellipse.radius / circle.radius < 1.6:
+    seen = edges[close].rays(RAYS)
+    if seen.mean() < LEAST_COVERAGE or not 0.6 < ellipse.radius / circle.radius < 1.6:
         return None
-    contrast = float(np.median(edges.strength[close])) if close.any() else 0.0
-    return Hole(ellipse, circle.inside, len(np.unique(edges.ray[close])) / RAYS, contrast)
+    contrast = float(np.median(edges.strength[close]))
+    inner, outer = band.levels(0.3 * MARGIN * circle.radius)
+    rise = float(np.median(circle.inside * (inner - outer)[seen]))
+    if rise < 0.3 * EDGE_WIDTH * contrast:  # a line, not a step: scratch, groove, glint
+        return None
+    return Hole(ellipse, circle.inside, float(seen.mean()), contrast, patch)
 
 
 def _expected_ellipse(circle: Circle, camera: CameraModel, expected: Expected) -> Ellipse:

@@ -9,10 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from cell.core.observation import Image
-from cell.metrology.arrays import Grey, Mask
-from cell.metrology.edges import Band, find_edges, sample_band, spread
+from cell.metrology.arrays import Mask
+from cell.metrology.band import Band, sample_band, spread
+from cell.metrology.edges import find_edges
 from cell.metrology.ellipse import Ellipse
-from cell.metrology.find_holes import Hole
+from cell.metrology.find_holes import MARGIN, RAYS, Hole
 from cell.metrology.reasons import Reason, refusal
 
 COMPLETE = 0.75  # of the rim has to be seen
@@ -27,13 +28,14 @@ def check_inside(image: Image, rim: Ellipse) -> None:
         raise refusal("hole_cut_by_border")
 
 
-def check_whole(smooth: Grey, hole: Hole) -> None:
+def check_whole(hole: Hole) -> None:
     """Refuse a rim of which too little is seen, with the reason that fits."""
     radius = hole.ellipse.radius
-    band = sample_band(smooth, hole.ellipse, spread(0.22 * radius, 0.5), rays=180)
+    offsets = spread(MARGIN * radius, max(0.5, radius / 60.0))
+    band = sample_band(hole.patch, hole.ellipse, offsets, RAYS)
     edges = find_edges(band, hole.inside, 0.4 * hole.contrast)
-    seen = np.isin(np.arange(len(band.t)), edges.ray[np.abs(edges.offset) < 2.0])
-    if seen.mean() < COMPLETE and seen.any():
+    seen = edges[np.abs(edges.offset) < max(2.0, 0.03 * radius)].rays(RAYS)
+    if seen.mean() < COMPLETE:
         raise refusal(_why_incomplete(band, seen, radius),
                       f"{seen.mean():.0%} of the rim follows an ellipse")
 
@@ -42,8 +44,7 @@ def _why_incomplete(band: Band, seen: Mask, radius: float) -> Reason:
     """Judge a rim by the profiles on which its edge is missing: either the hole goes on beyond it
     (a slot), or metal lies inside it (something covers the hole).
     """
-    inner = band.grey[:, band.offsets < -BESIDE * radius].mean(axis=1)
-    outer = band.grey[:, band.offsets > BESIDE * radius].mean(axis=1)
+    inner, outer = band.levels(BESIDE * radius)
     hole, metal = float(np.median(inner[seen])), float(np.median(outer[seen]))
     middle, sign = (hole + metal) / 2.0, np.sign(metal - hole)
     goes_on = (sign * (outer[~seen] - middle) < 0.0).mean()

@@ -17,14 +17,14 @@ from scipy.special import ndtr
 
 from cell.core.geometry import Array
 from cell.metrology.arrays import Mask
-from cell.metrology.edges import Band
+from cell.metrology.band import Band
 from cell.metrology.spread import tukey_weights
 from cell.metrology.wall import Wall
 
 STEPS = 6
-USUAL_SHARE, SHARE_SIGMA, SHARE_SWING = 0.15, 0.2, 0.1  # k before looking, its change round the rim
-DARKEST, BRIGHTEST = -0.6, 0.9                          # k
-NARROWEST, WIDEST, USUAL_BLUR = 0.4, 6.0, 1.2           # px
+SHARE_SIGMA, SHARE_SWING = 0.2, 0.1   # of k before looking, and of its change round the rim
+DARKEST, BRIGHTEST = -0.6, 0.9        # k
+NARROWEST, WIDEST, USUAL_BLUR = 0.4, 6.0, 1.2  # px
 PIXELS_PER_ERROR = 30.0  # texture and smoothing: so many pixels go wrong together
 
 
@@ -64,7 +64,7 @@ class RimModel:
         self.design, self.normals = band.ellipse.design(band.t), band.ellipse.normals(band.t)
         self.around = np.column_stack([np.ones_like(band.t), np.cos(band.t), np.sin(band.t)])
         self.prior = np.concatenate([np.zeros(5), [USUAL_BLUR], wall.shift,
-                                     [USUAL_SHARE, 0.0, 0.0]])
+                                     [wall.share, 0.0, 0.0]])
         self.sigma = np.array([np.inf] * 6 + [wall.sigma] * 2
                               + [SHARE_SIGMA, SHARE_SWING, SHARE_SWING])
 

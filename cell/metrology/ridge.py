@@ -84,7 +84,7 @@ def _response(turned: Image) -> Grey:
 
 def _candidates(response: Grey) -> tuple[Array, Array, Array]:
     """Give the highest ridges of each line that stand out: u, line and height."""
-    unrest = 1.4826 * float(np.median(np.abs(response))) + 0.05
+    unrest = 1.4826 * float(np.median(np.abs(response[::2, ::4]))) + 0.05
     summit = ((response[:, 1:-1] > response[:, :-2]) & (response[:, 1:-1] >= response[:, 2:])
               & (response[:, 1:-1] > SIGNIFICANCE * unrest))
     heights = np.where(summit, response[:, 1:-1], np.float32(0.0))

@@ -6,11 +6,12 @@ import numpy as np
 
 from cell.core.geometry import Array
 from cell.metrology.arrays import Indices, Mask
-from cell.metrology.edges import Band, Edges
+from cell.metrology.band import Band
+from cell.metrology.edges import Edges
 from cell.metrology.ellipse import Ellipse
 from cell.metrology.spread import robust_sigma, tukey_weights
 
-DRAWS = 400
+DRAWS = 256
 GOLDEN = 0.6180339887498949
 
 

@@ -48,11 +48,11 @@ def vote_for_circles(image: Image, radii: Array, inside: int, count: int = 5) ->
     scale = np.array(image.shape, dtype=np.float64) / small.shape
     ballots = _ballots(small)
     layers = np.stack([_layer(ballots, r / factor, inside, small.shape) for r in radii])
-    best, which = layers.max(axis=0), layers.argmax(axis=0)
-    rows, columns = _peaks(best, radii[0] / factor, count)
+    rows, columns = _peaks(layers.max(axis=0), radii[0] / factor, count)
+    which = layers[:, rows, columns].argmax(axis=0)
     return [Circle(float((x + 0.5) * scale[1] - 0.5), float((y + 0.5) * scale[0] - 0.5),
-                   float(radii[which[y, x]]), inside, float(best[y, x]))
-            for y, x in zip(rows, columns, strict=True)]
+                   float(radii[layer]), inside, float(layers[layer, y, x]))
+            for layer, y, x in zip(which, rows, columns, strict=True)]
 
 
 def _ballots(small: Image) -> tuple[Indices, Indices, Grey, Grey, Grey]:

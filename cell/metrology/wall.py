@@ -17,18 +17,20 @@ from cell.metrology.ellipse import Ellipse, project_circle
 from cell.metrology.features import Expected
 
 USUAL_THICKNESS = 1.2  # mm
+USUAL_SHARE = 0.15     # of the step from hole to sheet, taken by a wall that is known to show
 USUAL_TILT = 0.06      # rad, the standard deviation of a tilt that nothing is known of
 
 
 @dataclass(frozen=True, eq=False)
 class Wall:
     """The far rim against the near one, px: moved by `shift` (2,), each +- `sigma`, and smaller
-    by `shrink`.
+    by `shrink`. `share` is what part of the step from hole to sheet a wall usually takes.
     """
 
     shift: Array
     sigma: float
     shrink: float
+    share: float
 
     @property
     def widest(self) -> float:
@@ -54,4 +56,6 @@ def predict_wall(rim: Ellipse, camera: CameraModel, expected: Expected) -> Wall:
     if expected.thickness is None:
         unsure = np.hypot(unsure, USUAL_TILT)
     sigma = 0.05 + thickness * unsure * float(camera.matrix[0, 0]) / depth
-    return Wall(far.centre - near.centre, sigma, near.radius - far.radius)
+    known = expected.thickness is not None and expected.normal is not None
+    return Wall(far.centre - near.centre, sigma, near.radius - far.radius,
+                USUAL_SHARE if known else 0.0)
