@@ -14,6 +14,7 @@ from cell.cli.check import check
 from cell.cli.compare import compare
 from cell.cli.error_model import error_model
 from cell.cli.locate import locate
+from cell.cli.run import run
 from cell.cli.sim import sim
 from cell.cli.study import study_app
 from cell.cli.words import console, print_json
@@ -31,6 +32,7 @@ app = typer.Typer(
 WRONG_WORDS: Any = typer.BadParameter.__mro__[2]  # the base of usage errors, wherever click lives
 REASONS = {2: "bad_input", 3: "device_fault", 4: "recording_failed"}
 
+app.command()(run)
 app.command()(locate)
 app.command()(error_model)
 app.add_typer(study_app)

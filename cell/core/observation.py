@@ -49,3 +49,7 @@ class Observation:
     def first(self, count: int) -> Observation:
         """Return the observation as it was after `count` views: what an earlier attempt knew."""
         return replace(self, views=self.views[:count])
+
+    def with_views(self, views: tuple[View, ...]) -> Observation:
+        """Return the observation with one attempt's views added."""
+        return replace(self, views=self.views + views)

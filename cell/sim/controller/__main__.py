@@ -9,6 +9,7 @@ import argparse
 import ctypes
 import itertools
 import json
+import math
 import os
 import signal
 import sys
@@ -28,7 +29,8 @@ def main() -> None:
     parent = options.parent
     if parent:
         ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL)
-    server = _serve_at(options.address, Controller(options.model, options.speed), options.rate)
+    server = _serve_at(options.address, Controller(options.model, options.speed,
+                                                       joints=options.joints), options.rate)
     ready = {"address": server.address, "pid": os.getpid(), "model": options.model}
     sys.stdout.write(json.dumps(ready) + "\n")
     sys.stdout.flush()
@@ -52,12 +54,21 @@ def _free_addresses() -> Iterator[str]:
         yield f"127.{1 + number // 62500 % 250}.{1 + number // 250 % 250}.{2 + number % 250}"
 
 
+def _radians(degrees: str) -> list[float]:
+    """Read six angles in degrees, separated by commas."""
+    joints = [math.radians(float(angle)) for angle in degrees.split(",")]
+    if len(joints) != 6:
+        raise argparse.ArgumentTypeError("expected six angles")
+    return joints
+
+
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m cell.sim.controller", description=__doc__)
     parser.add_argument("--model", choices=sorted(BUILDS), default="ur10e")
     parser.add_argument("--address", help="a loopback address, 127.x.y.z; a free one if not given")
     parser.add_argument("--speed", type=float, default=1.0, help="time runs faster by this factor")
     parser.add_argument("--rate", type=float, default=125.0, help="cycles a second")
+    parser.add_argument("--joints", type=_radians, help="where the arm stands, in degrees: 0,-90,…")
     parser.add_argument("--parent", type=int, default=0, help="end when this process has gone")
     return parser.parse_args()
 

@@ -6,7 +6,7 @@ Outputs are configured as the application asks for on a real controller: "low wh
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from enum import IntEnum
 
 import numpy as np
@@ -49,11 +49,13 @@ Departure = Callable[[Array], Motion]
 class Controller:
     """The state of a UR controller, driven on by `advance`. Metres and radians, as UR has them."""
 
-    def __init__(self, model: str, speed: float = 1.0, serial: str = "20235500417") -> None:
+    def __init__(self, model: str, speed: float = 1.0, serial: str = "20235500417",
+                 joints: Sequence[float] | None = None) -> None:
         self.model, self.serial, self.speed = model, serial, speed
         self.arm = EmulatedArm(BUILDS[model])
         self.time = self.wall = 0.0
-        self.joints, self.joint_speeds = PARKED.copy(), np.zeros(6)
+        self.joints = PARKED.copy() if joints is None else np.array(joints)
+        self.joint_speeds = np.zeros(6)
         self.tcp_offset, self.flange_from_tcp = np.zeros(6), np.eye(4)
         self._posed: tuple[Array | None, Array] = None, np.zeros(6)
         self.payload, self.payload_cog = 3.2, (0.0, 0.0, 0.06)

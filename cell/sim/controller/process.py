@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import selectors
 import socket
 import subprocess
 import sys
+from collections.abc import Sequence
 from types import TracebackType
 
 from cell.core.errors import DeviceError
@@ -23,8 +25,9 @@ class EmulatedController:
     with the thread that started it.
     """
 
-    def __init__(self, model: str, speed: float = 1.0, address: str | None = None) -> None:
-        self._model, self._speed, self._wanted = model, speed, address
+    def __init__(self, model: str, speed: float = 1.0, address: str | None = None,
+                 joints: Sequence[float] | None = None) -> None:
+        self._model, self._speed, self._wanted, self._joints = model, speed, address, joints
         self._process: subprocess.Popen[str] | None = None
         self._address = ""
 
@@ -44,6 +47,8 @@ class EmulatedController:
                    "--speed", str(self._speed), "--parent", str(os.getpid())]
         if self._wanted:
             command += ["--address", self._wanted]
+        if self._joints is not None:
+            command += [f"--joints={','.join(str(math.degrees(q)) for q in self._joints)}"]
         # A session of its own: Ctrl-C on the terminal is for the application, which stops the arm.
         self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                                          text=True, start_new_session=True)

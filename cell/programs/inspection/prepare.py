@@ -1,0 +1,44 @@
+"""What stands before a run: documents read, the way planned and checked, nothing moved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from cell.archive.papers import read_papers
+from cell.core.documents.papers import Papers, check_identity
+from cell.core.kinematics import Arm, arm_for
+from cell.core.ports import RobotIdentity
+from cell.metrology.plan import PlannedStop, plan_stops
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A job ready to run: what its papers say, and the stops in order.
+
+    `folder` is the cell's own; `conditions` are numbers of the day that enter the judgement.
+    """
+
+    papers: Papers
+    folder: Path
+    arm: Arm
+    stops: tuple[PlannedStop, ...]
+    conditions: Mapping[str, float] = field(default_factory=dict)
+
+    def check_identity(self, identity: RobotIdentity) -> None:
+        """Refuse a robot other than the one that the calibration set was made with."""
+        check_identity(self.papers.calibration.hand_eye.robot, identity)
+
+
+def prepare(job: Path, cell: str | None = None) -> Prepared:
+    """Read the documents of a job and plan its stops.
+
+    Raises:
+        DocumentError: a document is wrong, or a stop cannot be reached safely.
+    """
+    found = read_papers(job, cell)
+    papers = found.parse()
+    arm = arm_for(papers.station.robot.model)
+    stops = plan_stops(papers.job, papers.holes, papers.calibration, papers.station, arm)
+    return Prepared(papers, found.folder, arm, stops)

@@ -1,0 +1,125 @@
+"""`cell run`: one body from a job file to a verdict, a recording, a seal and a report."""
+
+from __future__ import annotations
+
+import json
+import secrets
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from cell.archive.logs import new_log
+from cell.core.documents.record import Start
+from cell.core.documents.result import BodyResult
+from cell.core.errors import CellError, DocumentError, RecordingError
+from cell.programs.inspection import BodyInspection, Prepared, Watch, prepare
+from cell.programs.station import Station, open_station
+from cell.recording import Recorder, collect_versions
+from cell.report.body import BodyRun, body_report
+
+
+@dataclass(frozen=True)
+class Request:
+    """What `cell run` was asked for."""
+
+    job: Path
+    cell: str | None = None
+    body_id: str | None = None
+    logs: Path = Path("logs")
+    speed: float = 1.0
+    truth: Path | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Finished:
+    """What came of it."""
+
+    body_id: str
+    status: Literal["complete", "interrupted"]
+    result: BodyResult
+    log: Path
+    report: Path
+
+
+def run_job(request: Request, watch: Watch) -> Finished:
+    """Measure one body as the job says.
+
+    Everything that can be known before the robot moves is checked first.
+
+    Raises:
+        DocumentError: job, nominals, calibration, logs folder or an option is wrong; nothing moved.
+        DeviceError: a device failed; what was seen until then is in the recording.
+        RecordingError: the recording could not be written.
+    """
+    prepared = prepare(request.job, request.cell)
+    _check_options(request, prepared)
+    log = new_log(request.logs, prepared.papers.job.name)
+    body_id = request.body_id or f"{prepared.papers.job.name}-{secrets.token_hex(4)}"
+    watch(0, len(prepared.stops), "opening the cell")
+    with open_station(prepared.papers.station, prepared.folder, request.speed) as station:
+        prepared.check_identity(station.identity)
+        start = begin(prepared, station, body_id, log.stem)
+        inspection = BodyInspection(station, prepared, start, Recorder(log, start), watch)
+        status = _measure(inspection)
+        if request.truth is not None and station.world is not None:
+            _write_truth(request.truth, station, body_id)
+    report = write_report(log, start, inspection)
+    return Finished(body_id, status, inspection.result, log, report)
+
+
+def begin(prepared: Prepared, station: Station, body_id: str, recording_id: str) -> Start:
+    """Write down everything that is known before the first move."""
+    return Start(recording_id, body_id, time.time(), prepared.papers.set_id, prepared.papers.texts,
+                 collect_versions(), station.identity.as_text(), prepared.conditions,
+                 trial=True, simulated=station.document.simulated)
+
+
+def write_report(log: Path, start: Start, inspection: BodyInspection) -> Path:
+    """Write the HTML report beside the recording and return where it is."""
+    page = body_report(BodyRun(start, inspection.records, inspection.stop,
+                               inspection.prepared.papers.holes))
+    report = log.with_suffix(".html")
+    try:
+        report.write_text(page, encoding="utf-8")
+    except OSError as error:
+        raise RecordingError(f"the report {report} cannot be written: {error.strerror}") from error
+    return report
+
+
+def _measure(inspection: BodyInspection) -> Literal["complete", "interrupted"]:
+    """Measure all holes and close the recording, whatever happens on the way."""
+    try:
+        inspection.measure_remaining()
+        inspection.go_home()
+    except KeyboardInterrupt:
+        inspection.abandon("interrupted", "stopped by a person")
+        return "interrupted"
+    except CellError as error:
+        inspection.abandon("fault", str(error))
+        raise
+    except BaseException as error:
+        inspection.abandon("aborted", f"a fault of the program: {error!r}")
+        raise
+    inspection.finish("complete")
+    return "complete"
+
+
+def _check_options(request: Request, prepared: Prepared) -> None:
+    station = prepared.papers.station
+    if request.truth is not None and station.camera.driver != "sim":
+        raise DocumentError("--truth is for simulated cells: nobody knows the truth of a real body",
+                            source=f"cell {station.name}")
+    if request.speed != 1.0 and not station.simulated:
+        raise DocumentError("--speed is for simulated cells: a real robot runs in real time",
+                            source=f"cell {station.name}")
+    if request.truth is not None and not request.truth.parent.is_dir():
+        raise DocumentError("the folder for the truth does not exist", source=str(request.truth))
+
+
+def _write_truth(path: Path, station: Station, body_id: str) -> None:
+    assert station.world is not None
+    try:
+        path.write_text(json.dumps({"body": body_id, **station.world.truth()}, indent=1))
+    except OSError as error:
+        raise RecordingError(f"the truth cannot be written to {path}: {error.strerror}") from error
