@@ -1,4 +1,4 @@
-"""Predict where a body lies from the holes measured on it so far, so that the next stop is centred."""
+"""Predict where a body lies from the holes measured so far, so that the next stop is centred."""
 
 from __future__ import annotations
 

@@ -13,6 +13,7 @@ no tries left                                 accept what there is, or give_up
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
@@ -119,13 +120,10 @@ def _towards_hole(observation: Observation, hole: Hole, calibration: Calibration
     sensor = calibration.sensor.model
     ring = [view for view in observation.views if view.light == "ring"][-1]
     camera_from_body = calibration.body_from_camera(reached(ring)).inverse
-    expected = expect(hole, camera_from_body @ observation.body_from_predicted, 0.0)
-    assert expected.centre is not None and expected.normal is not None
-    centre = expected.centre
-    try:
-        ellipse = detect_hole(ring.image, sensor.camera, expected).ellipse
-        ray = sensor.camera.rays(np.array(ellipse[:2]))
-        centre = Plane.through(expected.centre, expected.normal).meet(ray)
-    except UnmeasurableError:
-        pass
+    camera_from_plan = camera_from_body @ observation.body_from_predicted
+    centre = camera_from_plan @ hole.centre_on_seen_face
+    with suppress(UnmeasurableError):
+        rim = detect_hole(ring.image, sensor.camera, expect(hole, camera_from_plan, 0.0))
+        plane = Plane.through(centre, camera_from_plan.turn(hole.normal))
+        centre = plane.meet(sensor.camera.rays(np.array(rim.ellipse[:2])))
     return np.asarray(centre - [0.0, 0.0, sensor.working_distance])
