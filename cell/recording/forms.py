@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cache
 from types import NoneType, UnionType
@@ -41,8 +41,17 @@ def canonical(plain: object) -> bytes:
     """Write plain values as the bytes that are hashed: JSON, keys sorted, floats by their shortest
     exact digits.
     """
-    return json.dumps(plain, sort_keys=True, separators=(",", ":"), default=np.ndarray.tolist
-                      ).encode()
+    return json.dumps(plain, sort_keys=True, separators=(",", ":"), default=_numbers).encode()
+
+
+def _numbers(value: np.ndarray[Any, Any] | np.generic) -> Plain:
+    return value.tolist()
+
+
+def as_recorded(record: Value) -> Value:
+    """Return a record as it would come back from a recording."""
+    form = form_of(type(record))
+    return form.value(form.plain(record))
 
 
 def pixel_hash(image: Image) -> str:
@@ -53,7 +62,7 @@ def pixel_hash(image: Image) -> str:
 
 
 @cache
-def form_of(kind: object) -> Form:
+def form_of(kind: Hashable) -> Form:
     """Return the form of a type: a number, text, array, transform, record, or what is made of them.
 
     Raises:

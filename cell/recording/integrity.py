@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cryptography.exceptions import UnsupportedAlgorithm
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
-from cryptography.hazmat.primitives.serialization import load_pem_public_key
 
 from cell.core.errors import DocumentError
-from cell.recording.keys import is_signed_by, key_id
+from cell.recording.keys import is_signed_by, key_id, parse_public_key
 from cell.recording.seal import Seal, read_seal, reference, seal_path
 
 
@@ -24,13 +22,13 @@ class Check:
     words: str
 
 
-def check_seal(log: Path, trusted: Sequence[Ed25519PublicKey] = ()) -> tuple[Seal | None,
-                                                                            list[Check]]:
+def check_seal(log: Path, trusted: Collection[str] = ()) -> tuple[Seal | None, list[Check]]:
     """Check a recording against its seal: the file, the signature, the link to the one before.
 
     Args:
         log: the recording.
-        trusted: keys that are known here; with none, a signature only shows its key's name.
+        trusted: the ids of keys that are known here; with none, a signature shows no more than
+            the id of its key.
     """
     path = seal_path(log)
     if not path.exists():
@@ -71,27 +69,30 @@ def _check_file(log: Path, seal: Seal) -> Check:
     return Check("file", True, f"{seal.size} bytes as sealed on {seal.sealed}")
 
 
-def _check_signature(seal: Seal, trusted: Sequence[Ed25519PublicKey]) -> Check:
+def _check_signature(seal: Seal, trusted: Collection[str]) -> Check:
     if seal.signature is None:
         return Check("signature", False if trusted else None,
                      "none: the seal is made of hashes only, anyone can make another")
-    key = _key_in(seal)
-    if key is None or not is_signed_by(key, bytes.fromhex(seal.signature), seal.signed_bytes):
+    key = _signing_key(seal)
+    if key is None:
         return Check("signature", False, "the seal was altered: its signature does not fit")
     name = key_id(key)
-    if name in {key_id(known) for known in trusted}:
+    if name in trusted:
         return Check("signature", True, f"by the known key {name}")
     return Check("signature", False if trusted else None,
                  f"by the key {name}, which is not known here: compare it with the cell's")
 
 
-def _key_in(seal: Seal) -> Ed25519PublicKey | None:
+def _signing_key(seal: Seal) -> Ed25519PublicKey | None:
+    """Take the key out of a seal whose signature is its own; None where it is not."""
+    key = parse_public_key(seal.public_key or "")
     try:
-        key = load_pem_public_key((seal.public_key or "").encode())
-        bytes.fromhex(seal.signature or "")
-    except (ValueError, UnsupportedAlgorithm):
+        signature = bytes.fromhex(seal.signature or "")
+    except ValueError:
         return None
-    return key if isinstance(key, Ed25519PublicKey) and key_id(key) == seal.key else None
+    fits = key is not None and key_id(key) == seal.key and is_signed_by(key, signature,
+                                                                        seal.signed_bytes)
+    return key if fits else None
 
 
 def _check_link(log: Path, seal: Seal) -> Check:

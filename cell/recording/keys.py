@@ -91,14 +91,21 @@ def read_public_key(path: Path) -> Ed25519PublicKey:
         DocumentError: it cannot be read or is no Ed25519 public key.
     """
     try:
-        key = load_pem_public_key(path.read_bytes())
-    except OSError as error:
-        raise DocumentError(f"cannot be read: {error.strerror}", source=str(path)) from None
-    except (ValueError, UnsupportedAlgorithm):
-        key = None
-    if not isinstance(key, Ed25519PublicKey):
+        key = parse_public_key(path.read_text())
+    except (OSError, UnicodeDecodeError) as error:
+        raise DocumentError(f"cannot be read: {error}", source=str(path)) from None
+    if key is None:
         raise DocumentError("is not an Ed25519 public key (PEM)", source=str(path))
     return key
+
+
+def parse_public_key(text: str) -> Ed25519PublicKey | None:
+    """Parse a public key from PEM; None where it is none."""
+    try:
+        key = load_pem_public_key(text.encode())
+    except (ValueError, UnsupportedAlgorithm):
+        return None
+    return key if isinstance(key, Ed25519PublicKey) else None
 
 
 def public_text(key: Ed25519PublicKey) -> str:

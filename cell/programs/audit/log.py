@@ -1,0 +1,155 @@
+"""The audit of one recording: is it intact, and does every number come out again?"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+
+from cell.core.documents.record import HoleRecord, Start, Stop
+from cell.core.documents.result import BodyResult, Outcome
+from cell.core.errors import DocumentError
+from cell.metrology.decide import judge_run
+from cell.metrology.measure import measure_hole
+from cell.programs.audit.compare import Comparison, Difference, compare
+from cell.programs.audit.question import Question
+from cell.programs.audit.report import Change, LogAudit
+from cell.recording.forms import as_recorded
+from cell.recording.integrity import Check, check_chain, check_images, check_seal
+from cell.recording.pages import PRUNED, Page, read_pages
+from cell.recording.seal import Seal
+from cell.recording.versions import collect_versions
+
+Watch: TypeAlias = Callable[[int], None]
+"""Told how many holes are through."""
+
+PLAIN = Question()
+
+
+def audit_log(log: Path, question: Question = PLAIN, watch: Watch = lambda _: None
+              ) -> LogAudit:
+    """Audit one recording. Never raises for what is wrong with it: that is the answer.
+
+    Args:
+        log: the recording.
+        question: how to go about it, and what else to ask.
+        watch: told how many holes are through.
+    """
+    seal, checks = check_seal(log, question.trusted)
+    if problem := _refusal(checks, seal, question):
+        return LogAudit(log, problem, checks=tuple(checks))
+    try:
+        pages = read_pages(log)
+        audit = _Audit(question, next(pages))
+        for count, page in enumerate(pages):
+            audit.take(page)
+            watch(count)
+        return audit.close(log, seal, checks)
+    except DocumentError as error:
+        return LogAudit(log, str(error), checks=tuple(checks))
+
+
+def _refusal(checks: list[Check], seal: Seal | None, question: Question) -> str | None:
+    """Say why a recording is not even read: unsealed, or not as it was sealed."""
+    failed = [f"{check.level}: {check.words}" for check in checks if check.passed is False]
+    if seal is None and not failed:
+        failed = [check.words for check in checks]
+    return "; ".join(failed) if failed and not question.unsealed else None
+
+
+class _Audit:
+    """One recording on its way through: the papers first, then hole by hole."""
+
+    def __init__(self, question: Question, first: Page) -> None:
+        assert isinstance(first.record, Start)  # `read_pages` sees to it
+        self._start, self._what_if = first.record, question.what_if.asks
+        self._papers = question.papers(first.record)
+        self._page, self._faults, self._missing = first, list(first.faults), 0
+        self._recorded: list[HoleRecord] = []
+        self._then: list[HoleRecord] = []
+        self._stop: Stop | None = None
+        self._numbers: Counter[str] = Counter()
+        self._differences: list[Difference] = []
+        self._warnings: list[str] = []
+        self._skipped = 0
+
+    def take(self, page: Page) -> None:
+        """Take the next page: measure its hole again, or hear how the run ended."""
+        self._faults += page.faults
+        if isinstance(page.record, HoleRecord):
+            self._page, self._missing = page, self._missing + page.missing
+            self._measure(page.record, pruned=bool(page.missing))
+        elif isinstance(page.record, Stop):
+            self._page, self._stop = page, page.record
+        elif not page.faults:
+            self._warnings.append("the end is torn: the last hole is not whole and was left out")
+
+    def close(self, log: Path, seal: Seal | None, checks: list[Check]) -> LogAudit:
+        """Judge the body again and say what came of it."""
+        then = as_recorded(judge_run(self._papers, self._start, self._then))
+        recorded = self._stop.result if self._stop is not None else None
+        if recorded is not None and not self._what_if:
+            self._tally(compare("body", recorded, then))
+        if recorded is None and self._what_if:
+            recorded = as_recorded(judge_run(self._papers, self._start, self._recorded))
+        chain = check_chain(seal, self._page.chain, len(self._recorded), self._faults)
+        return LogAudit(
+            log, None if chain.passed else f"not intact: {chain.words}", self._start.body_id,
+            self._start.started, "died" if self._stop is None else self._stop.status,
+            self._page.chain, len(self._recorded),
+            (*checks, chain, check_images(self._missing)), self._numbers,
+            tuple(self._differences), _versions_that_differ(self._start), tuple(self._warnings),
+            self._skipped, recorded.verdict if recorded is not None else None, then.verdict,
+            _changes(recorded, then) if recorded is not None and self._what_if else ())
+
+    def _measure(self, record: HoleRecord, pruned: bool) -> None:
+        self._recorded.append(_without_images(record))
+        if pruned:
+            self._skipped += 1
+            self._then.append(_without_images(record))
+            return
+        again = record.attempts[-1:] if self._what_if else record.attempts
+        then = tuple(replace(attempt, outcome=self._outcome(record, attempt.views))
+                     for attempt in again)
+        if not self._what_if:
+            for number, (was, now) in enumerate(zip(record.attempts, then, strict=True)):
+                self._tally(compare(f"{record.observation.hole_id} attempt {number}", was, now))
+        self._then.append(_without_images(replace(record, attempts=then)))
+
+    def _outcome(self, record: HoleRecord, views: int) -> Outcome:
+        """Measure a hole as it was after `views` views: the very function that ran live."""
+        papers, observation = self._papers, record.observation.first(views)
+        return measure_hole(observation, papers.hole(observation.hole_id), papers.calibration,
+                            papers.job.method, np.radians(papers.job.normal_sigma_deg))
+
+    def _tally(self, comparisons: Iterator[Comparison]) -> None:
+        for comparison in comparisons:
+            difference = comparison.difference
+            level = "identical" if difference is None else difference.level
+            self._numbers[level] += comparison.numbers
+            if difference is not None:
+                self._differences.append(difference)
+
+
+def _without_images(record: HoleRecord) -> HoleRecord:
+    """Keep what a judgement needs: a month of bodies must fit into memory."""
+    views = tuple(replace(view, image=PRUNED) for view in record.observation.views)
+    return replace(record, observation=replace(record.observation, views=views))
+
+
+def _versions_that_differ(start: Start) -> dict[str, tuple[str, str]]:
+    here = collect_versions()
+    return {name: (start.versions.get(name, "-"), here.get(name, "-"))
+            for name in sorted(start.versions.keys() | here.keys())
+            if start.versions.get(name) != here.get(name)}
+
+
+def _changes(recorded: BodyResult, then: BodyResult) -> tuple[Change, ...]:
+    was = {feature.id: feature for feature in recorded.features}
+    return tuple(Change(now.id, was[now.id].verdict, now.verdict, was[now.id].deviation or {},
+                        now.deviation or {})
+                 for now in then.features if now.id in was)
