@@ -10,13 +10,14 @@ import numpy as np
 from cell.core.observation import Image
 from cell.core.optics import SensorModel
 from cell.metrology.detect_hole import detect_rim
-from cell.metrology.detect_stripe import crosses, follow_stripe
+from cell.metrology.detect_stripe import crosses, falls_into, follow_stripe
 from cell.metrology.features import Expected, Rim, Stripe
 from cell.metrology.find_holes import Hole, find_holes
 from cell.metrology.gates import COMPLETE
 from cell.metrology.reasons import refusal
 from cell.metrology.ridge import Ridge, find_ridge, runs_upright
 
+FAINT = 0.2       # of the contrast of another hole in the same picture
 ANYWHERE = 100.0  # mm, the standard deviation of where a hole may be in the picture
 
 
@@ -52,16 +53,19 @@ def _at_depth(expected: Expected, ridge: Ridge, sensor: SensorModel) -> Expected
 def _crossed(holes: Iterable[Hole], ridge: Ridge) -> Hole:
     """Choose the hole that the stripe crosses: the first whole one, else the most complete."""
     crossed: Hole | None = None
-    missed = False
+    strongest = 0.0  # contrast of the whole holes beside the stripe: an odd arc is much weaker
     for hole in holes:
+        whole = hole.coverage > COMPLETE
         if not crosses(ridge, hole.ellipse):
-            missed |= hole.coverage > COMPLETE
-        elif hole.coverage > COMPLETE:
+            strongest = max(strongest, hole.contrast if whole else 0.0)
+        elif hole.contrast < FAINT * strongest or not falls_into(ridge, hole.ellipse):
+            continue
+        elif whole:
             return hole
         elif crossed is None or hole.coverage > crossed.coverage:
             crossed = hole
-    if crossed is None:
-        raise refusal("laser_misses_hole" if missed else "no_hole")
+    if crossed is None or crossed.contrast < FAINT * strongest:
+        raise refusal("laser_misses_hole" if strongest else "no_hole")
     return crossed
 
 

@@ -21,6 +21,8 @@ LENGTH = 12.0       # mm of stripe used on either side: the sheet is flat as far
 HALF_WINDOW = 10    # px across the stripe: four standard deviations of a wide one
 FLOOR = 0.2         # of the stripe's height, below which nothing counts towards its centre
 LEAST_LINES = 8     # on either side
+DEEP = 0.95         # of the radius, from which on a stripe counts as inside
+LEAST_GAP = 0.3     # of the chord, on which the stripe has to be gone
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +68,12 @@ def follow_stripe(image: Image, ridge: Ridge, rim: Rim, sensor: SensorModel,
 
 def crosses(ridge: Ridge, hole: Ellipse) -> bool:
     """Tell whether the stripe passes through an ellipse."""
-    return bool((hole.reach(ridge.points(4096)) < 1.0).any())
+    return bool((hole.reach(ridge.points(ridge.length)) < DEEP).any())
+
+
+def falls_into(ridge: Ridge, hole: Ellipse) -> bool:
+    """Tell whether the stripe leaves the sheet inside an ellipse, as it does over a hole."""
+    return ridge.interrupted(hole.reach(ridge.points(ridge.length)) < DEEP) > LEAST_GAP
 
 
 def _hole(rim: Rim) -> Ellipse:

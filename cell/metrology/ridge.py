@@ -21,6 +21,7 @@ PEAKS = 2              # ridges kept a line: the stripe, and one on what lies be
 DRAWS = 300
 TOLERANCE = 2.5        # px, lens distortion over the length included
 SIGNIFICANCE = 6.0     # of a ridge above the image's own unrest
+PRESENT = 0.35          # of its usual height, to be seen on a line
 LEAST_SHARE = 0.15     # of the lines must carry the stripe
 GOLDEN = 0.6180339887498949
 
@@ -30,7 +31,8 @@ class Ridge:
     """A straight stripe: across it at `v`, it lies at `offset + slope v`, px.
 
     `upright` says whether the stripe runs along the columns (u is x); `share` how much of the
-    image's length it covers, `height` its typical height in grey over its surroundings.
+    image's length it covers, `height` its typical height in grey over its surroundings. `strength`
+    is the height along it, one for BIN lines, as a share of the typical one.
     """
 
     offset: float
@@ -38,10 +40,21 @@ class Ridge:
     upright: bool
     share: float
     height: float
+    strength: Array
 
     def across(self, v: Array) -> Array:
         """Say where the stripe lies across its length, at each v."""
         return self.offset + self.slope * v
+
+    @property
+    def length(self) -> int:
+        """How many lines of the image lie along the stripe, but for a rest below BIN."""
+        return BIN * len(self.strength)
+
+    def interrupted(self, lines: Mask) -> float:
+        """Say on which share of the image's `lines` (length,) along it the stripe is missing."""
+        dark = np.repeat(self.strength < PRESENT, BIN)
+        return float(dark[lines].mean()) if lines.any() else 0.0
 
     def points(self, length: int) -> Array:
         """Give pixels (length, 2), x and y, one for each line along the stripe."""
@@ -70,8 +83,10 @@ def find_ridge(image: Image, *, upright: bool) -> Ridge | None:
     share = len(np.unique(line[near])) / len(response)
     if share < LEAST_SHARE:
         return None
-    slope, offset = np.polyfit(v[near], u[near], 1)
-    return Ridge(float(offset), float(slope), upright, share, float(np.median(height[near])))
+    slope, offset = map(float, np.polyfit(v[near], u[near], 1))
+    usual = float(np.median(height[near]))
+    strength = _along(response, offset, slope) / usual
+    return Ridge(offset, slope, upright, share, usual, strength)
 
 
 def _response(turned: Image) -> Grey:
@@ -80,6 +95,15 @@ def _response(turned: Image) -> Grey:
     lines = binned.astype(np.float32)
     return (cv2.GaussianBlur(lines, (0, 0), sigmaX=NARROW, sigmaY=0.8)
             - cv2.GaussianBlur(lines, (0, 0), sigmaX=WIDE, sigmaY=0.8))
+
+
+def _along(response: Grey, offset: float, slope: float) -> Array:
+    """Give the highest response near the line, for each line of the response."""
+    middle = offset + slope * (np.arange(len(response)) * BIN + (BIN - 1) / 2.0)
+    near = np.rint(middle).astype(np.intp)[:, None] + np.arange(-2, 3)
+    inside = np.clip(near, 0, response.shape[1] - 1)
+    highest = np.take_along_axis(response, inside, axis=1).max(axis=1).astype(np.float64)
+    return np.where((near[:, 2] >= 0) & (near[:, 2] < response.shape[1]), highest, 0.0)
 
 
 def _candidates(response: Grey) -> tuple[Array, Array, Array]:
