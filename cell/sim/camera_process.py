@@ -36,7 +36,7 @@ from cell.sim.world import draw_world
 
 DIE_WITH_PARENT = 1       # prctl's PR_SET_PDEATHSIG
 CONNECT_SECONDS = 5.0
-REPORT_SECONDS = 0.5      # without a report for so long the controller has gone
+REPORT_SECONDS = 2.0      # without a report for so long the controller has gone
 LATE_SECONDS = 1.5        # by which a late image comes later, in the camera's own time
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import cv2
 import numpy as np
 
 from cell.core.geometry import Array
@@ -78,18 +77,17 @@ class Lamps:
         return (self.design.laser_level * bell).astype(np.float32)
 
     def speckled(self, stripe: Light, finish: Finish) -> Light:
-        """Break laser light up into speckles, as a rough surface does: correlated over a pixel."""
+        """Break laser light up into speckles of a pixel, which the lens then correlates."""
         rows, columns = np.nonzero(stripe.any(axis=1))[0], np.nonzero(stripe.any(axis=0))[0]
         contrast = finish.speckle * self.design.speckle
         if not len(rows) or contrast == 0.0:
             return stripe
         window = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
         chance = np.random.default_rng(self.grain)
-        field = cv2.GaussianBlur(chance.standard_normal(stripe[window].shape, dtype=np.float32),
-                                 (0, 0), 0.7)
+        field = chance.standard_normal(stripe[window].shape, dtype=np.float32)
         spread = np.sqrt(np.log1p(contrast**2))
         out = stripe.copy()
-        out[window] *= np.exp(spread * field / field.std() - 0.5 * spread**2)
+        out[window] *= np.exp(spread * field - 0.5 * spread**2)
         return out
 
     @cached_property

@@ -1,14 +1,9 @@
 """The image shows the truth: edges and stripes lie where exact geometry puts them."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+from made_scenes import camera_over, demo_world, plate
 from scipy.ndimage import map_coordinates
-
-sys.path.insert(0, str(Path(__file__).parent))
-from scenery import camera_over, demo_world, plate
 
 from cell.core.geometry import Transform
 from cell.sim.render import Setting, render

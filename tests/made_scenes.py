@@ -6,11 +6,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cell.core.geometry import Transform
-from cell.sim.bodies import Body, Bore, Delivery, Sheet
+from cell.sim.bodies import Body, Bore, Delivery, Sheet, body_from_panel
 from cell.sim.scene import SceneDocument, read_scene
 from cell.sim.world import World, draw_world
 
-DEMO = Path(__file__).parents[2] / "calibration" / "demo" / "scene.yaml"
+DEMO = Path(__file__).parents[1] / "calibration" / "demo" / "scene.yaml"
 
 
 def demo_scene() -> SceneDocument:
@@ -37,3 +37,17 @@ def camera_over(u: float, v: float, *, distance: float = 242.4, tilt_deg=(0.0, 0
     turn = Rotation.from_euler("xyz", [180.0 + tilt_deg[0], tilt_deg[1], roll_deg], degrees=True)
     axis = turn.as_matrix()[:, 2]
     return Transform.from_parts(turn.as_matrix(), np.array([u, v, 0.0]) - distance * axis)
+
+
+def over_hole(hole: str, *, roll_deg: float = 0.0, lean_deg=(0.0, 0.0)) -> Transform:
+    """base_from_flange by design, for a hole of the demo in the middle of the picture."""
+    scene = demo_scene()
+    wanted = next(entry for entry in scene.holes if entry.id == hole)
+    panel = next(entry for entry in scene.panels if entry.name == wanted.panel)
+    turn = Rotation.from_euler("xyz", [180.0 + lean_deg[0], lean_deg[1], roll_deg], degrees=True)
+    axis = turn.as_matrix()[:, 2]
+    panel_from_camera = Transform.from_parts(turn.as_matrix(),
+                                             np.array([*wanted.at, 0.0]) - 242.43 * axis)
+    base_from_camera = (Transform(np.array(scene.base_from_fixture)) @ body_from_panel(panel)
+                        @ panel_from_camera)
+    return base_from_camera @ Transform(np.array(scene.flange_from_camera)).inverse
