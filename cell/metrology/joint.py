@@ -19,11 +19,12 @@ from cell.core.geometry import Array, Plane, Transform
 from cell.core.optics import SensorModel
 from cell.metrology.conic import circle_centre_ray, fit_conic
 from cell.metrology.features import Expected, Rim, Stripe
-from cell.metrology.joint_problem import Prior, Problem, Solution, solve
+from cell.metrology.joint_problem import Prior, Problem
 from cell.metrology.joint_rows import Circle, Sight, StripeSight
+from cell.metrology.posterior import Posterior, solve_all
 from cell.metrology.reasons import refusal
 from cell.metrology.trace import trace_circle
-from cell.metrology.uncertainty import FORM_SIGMA, shares, solution_budget, total
+from cell.metrology.uncertainty import FORM_SIGMA, joint_budget, shares, total
 
 RADIUS_SIGMA = 0.1  # mm: weak on a whole rim, decisive on an arc
 UNKNOWN_RADIUS_SIGMA = 100.0  # mm
@@ -44,22 +45,22 @@ def locate_joint(rim: Rim, stripes: Sequence[Shot], sensor: SensorModel,
     Raises:
         UnmeasurableError: the points make no ellipse, or contradict the plan.
     """
-    solution = solve_circle(rim, stripes, sensor, expected)
-    circle = solution.circle
+    posterior = solve_circle(rim, stripes, sensor, expected)
+    circle = posterior.circle
     _check_against_plan(circle, expected)
-    budget = solution_budget(solution, rim.ambiguity, sensor)
+    budget = joint_budget(posterior, rim.ambiguity, sensor)
     return Located("joint", circle.centre, circle.radius, circle.normal, total(budget),
                    shares(budget), {**rim.quality, **stripes[0][0].quality},
                    trace_circle(circle, rim, stripes[0][0], sensor), budget)
 
 
 def solve_circle(rim: Rim, stripes: Sequence[Shot], sensor: SensorModel,
-                 expected: Expected) -> Solution:
+                 expected: Expected) -> Posterior:
     """Solve for the circle; an `expected.normal_sigma` near zero holds the normal."""
     sight = Sight.of(rim, sensor.camera)
     crossings = tuple(StripeSight.of(stripe, sensor, pose) for stripe, pose in stripes)
     start = _start(sight, crossings, expected)
-    return solve(Problem(sight, crossings, _prior(start, expected)), start)
+    return solve_all(Problem(sight, crossings, _prior(start, rim, expected)), start)
 
 
 def normal_sigma(expected: Expected) -> float:
@@ -88,10 +89,13 @@ def _tangents(normal: Array, stripe: StripeSight) -> Array:
     return np.stack([first, np.cross(normal, first)])
 
 
-def _prior(start: Circle, expected: Expected) -> Prior:
+def _prior(start: Circle, rim: Rim, expected: Expected) -> Prior:
+    mm_per_px = start.radius / float(np.sqrt(rim.ellipse[2] * rim.ellipse[3]))
+    form_sigma = float(np.hypot(FORM_SIGMA, rim.ambiguity * mm_per_px / np.sqrt(12.0)))
     radius = start.radius if expected.radius is None else expected.radius
     radius_sigma = UNKNOWN_RADIUS_SIGMA if expected.radius is None else RADIUS_SIGMA
-    return Prior(np.zeros(2), np.full(2, normal_sigma(expected)), FORM_SIGMA, radius, radius_sigma)
+    return Prior(np.zeros(2), np.full(2, normal_sigma(expected)), form_sigma, radius,
+                 radius_sigma)
 
 
 def _check_against_plan(circle: Circle, expected: Expected) -> None:

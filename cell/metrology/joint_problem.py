@@ -97,9 +97,10 @@ class Solution:
     known: list[Known]
 
     @property
-    def cost(self) -> float:
-        """The sum of squared weighted residuals."""
-        return float(sum(block.residual @ block.residual for block in [*self.seen, *self.known]))
+    def log_evidence(self) -> float:
+        """How well data and prior agree: comparable between priors of the same widths."""
+        cost = sum(float(block.residual @ block.residual) for block in [*self.seen, *self.known])
+        return 0.5 * float(np.linalg.slogdet(self.covariance)[1]) - 0.5 * cost
 
     def response(self, points: Seen, shift: Array) -> Array:
         """Compute how the unknowns answer to shifts (n, k) of points in the image, in px."""

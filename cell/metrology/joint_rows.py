@@ -60,6 +60,12 @@ class Circle:
                        radius=self.radius + float(step[RADIUS]), form=self.form + step[FORM],
                        shifts=self.shifts + step[SHIFTS:])
 
+    def step_to(self, other: Circle) -> Array:
+        """Subtract from another circle of the same tangents, in the order of the unknowns."""
+        return np.concatenate([other.centre - self.centre, other.turn - self.turn,
+                               [other.radius - self.radius], other.form - self.form,
+                               other.shifts - self.shifts])
+
 
 @dataclass(frozen=True, eq=False)
 class Sight:

@@ -79,7 +79,7 @@ def locate_two_step(rim: Rim, stripe: Stripe, sensor: SensorModel, expected: Exp
     line = fit_line(sensor.camera.normalise(stripe.points))
     solved = solve_two_step(conic, line, sensor.light_plane)
     held = replace(expected, normal_sigma=HELD)
-    solution = solve_circle(rim, [(stripe, Transform.identity())], sensor, held)
+    solution = solve_circle(rim, [(stripe, Transform.identity())], sensor, held).solutions[0]
     budget = two_step_budget(np.append(solved.centre, solved.radius), solution,
                              normal_sigma(expected), rim.ambiguity, sensor)
     trace = {"chord": np.stack([solved.A, solved.B]), "q": solved.Q, "centre": solved.centre}

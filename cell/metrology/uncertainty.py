@@ -27,6 +27,7 @@ from cell.core.optics import SensorModel
 from cell.metrology.error_model import two_step_error
 from cell.metrology.joint_problem import Seen, Solution
 from cell.metrology.joint_rows import RADIUS
+from cell.metrology.posterior import Posterior
 
 Budget: TypeAlias = dict[str, Array]
 """Covariances (4, 4) of x, y, z and the radius by source, mm²; sources are independent."""
@@ -44,6 +45,18 @@ def total(budget: Budget) -> Array:
 def shares(budget: Budget) -> dict[str, tuple[float, float, float, float]]:
     """List each source's standard uncertainties of x, y, z and the radius (or diameter), mm."""
     return {source: _deviations(covariance) for source, covariance in budget.items()}
+
+
+def joint_budget(posterior: Posterior, ambiguity: float, sensor: SensorModel) -> Budget:
+    """Split the uncertainty of the joint estimate by source; `ambiguity` px as in `Rim`.
+
+    What lies between several solutions is what the normal's prior left open.
+    """
+    budget: Budget = {"normal_prior": posterior.spread}
+    for solution, weight in zip(posterior.solutions, posterior.weights, strict=True):
+        for source, share in solution_budget(solution, ambiguity, sensor).items():
+            budget[source] = budget.get(source, 0.0) + weight * share
+    return budget
 
 
 def solution_budget(solution: Solution, ambiguity: float, sensor: SensorModel) -> Budget:
