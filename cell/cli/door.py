@@ -10,11 +10,14 @@ import typer
 from rich.markup import escape
 
 from cell import __version__
+from cell.cli.audit import audit
 from cell.cli.check import check
 from cell.cli.compare import compare
 from cell.cli.error_model import error_model
 from cell.cli.locate import locate
+from cell.cli.report import report
 from cell.cli.run import run
+from cell.cli.seal_key import seal_key_app
 from cell.cli.sim import sim
 from cell.cli.study import study_app
 from cell.cli.words import console, print_json
@@ -33,9 +36,12 @@ WRONG_WORDS: Any = typer.BadParameter.__mro__[2]  # the base of usage errors, wh
 REASONS = {2: "bad_input", 3: "device_fault", 4: "recording_failed"}
 
 app.command()(run)
+app.command()(report)
 app.command()(locate)
 app.command()(error_model)
 app.add_typer(study_app)
+app.command()(audit)
+app.add_typer(seal_key_app)
 app.command()(check)
 app.command()(compare)
 app.command()(sim)

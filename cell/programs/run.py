@@ -14,6 +14,7 @@ from cell.core.documents.record import Start
 from cell.core.documents.result import BodyResult
 from cell.core.errors import CellError, DocumentError, RecordingError
 from cell.programs.inspection import BodyInspection, Prepared, Watch, prepare
+from cell.programs.report import write_page
 from cell.programs.station import Station, open_station
 from cell.recording import Recorder, collect_versions
 from cell.report.body import BodyRun, body_report
@@ -79,12 +80,7 @@ def write_report(log: Path, start: Start, inspection: BodyInspection) -> Path:
     """Write the HTML report beside the recording and return where it is."""
     page = body_report(BodyRun(start, inspection.records, inspection.stop,
                                inspection.prepared.papers.holes))
-    report = log.with_suffix(".html")
-    try:
-        report.write_text(page, encoding="utf-8")
-    except OSError as error:
-        raise RecordingError(f"the report {report} cannot be written: {error.strerror}") from error
-    return report
+    return write_page(page, log.with_suffix(".html"))
 
 
 def _measure(inspection: BodyInspection) -> Literal["complete", "interrupted"]:

@@ -67,6 +67,9 @@ def body_report(run: BodyRun) -> str:
         picture=draw_deviations(result.features, run.holes) if result else "",
         features=[(feature, _rows(feature)) for feature in (result.features if result else ())],
         closer=_closer_looks(run, result), counts=_counts(result), effort=_effort(run),
+        alignment=[(name.replace("_", " "), _in_words(value))
+                   for name, value in (result.alignment if result else {}).items()
+                   if value not in ("", [], {}, None)],
     )
 
 
@@ -106,6 +109,17 @@ def _effort(run: BodyRun) -> list[dict[str, object]]:
     return [{"id": record.observation.hole_id,
              "decisions": [attempt.decision for attempt in record.attempts]}
             for record in run.records if len(record.attempts) > 1]
+
+
+def _in_words(value: object) -> str:
+    """Write a value of the alignment's summary for people: four digits are enough."""
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, list | tuple):
+        return ", ".join(_in_words(one) for one in value)
+    if isinstance(value, dict):
+        return "; ".join(f"{name}: {_in_words(one)}" for name, one in value.items())
+    return str(value)
 
 
 def _moment(seconds: float) -> str:

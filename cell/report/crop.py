@@ -11,14 +11,14 @@ from cell.core.documents.result import Located
 from cell.core.geometry import Array
 from cell.core.observation import Image
 
-MAGNIFICATION = 3
+SHOWN = 420  # px that a crop is wide on the page, at least
 MARGIN = 1.6  # of the rim's half extent
 GREEN, ORANGE, CYAN, WHITE = (80, 220, 80), (60, 150, 255), (255, 220, 60), (255, 255, 255)
 SUBPIXEL_BITS = 4
 
 
 def draw_crop(image: Image, located: Located | None) -> str:
-    """Draw the neighbourhood of the hole and return it as a PNG data address for a page.
+    """Draw the neighbourhood of the hole and return it as a data address for a page.
 
     Without `located` (a refused hole) the whole picture is shown, half size.
     """
@@ -27,9 +27,9 @@ def draw_crop(image: Image, located: Located | None) -> str:
         return _as_data(cv2.cvtColor(small, cv2.COLOR_GRAY2BGR))
     left, top, right, bottom = _window(located.trace["ellipse"], image.shape)
     cut = cv2.cvtColor(np.ascontiguousarray(image[top:bottom, left:right]), cv2.COLOR_GRAY2BGR)
-    picture = cv2.resize(cut, None, fx=MAGNIFICATION, fy=MAGNIFICATION,
-                         interpolation=cv2.INTER_NEAREST)
-    _draw_trace(picture, located.trace, np.array([left, top], dtype=np.float64))
+    scale = max(1, -(-SHOWN // (right - left)))
+    picture = cv2.resize(cut, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
+    _draw_trace(picture, located.trace, np.array([left, top], dtype=np.float64), scale)
     return _as_data(picture)
 
 
@@ -41,9 +41,10 @@ def _window(ellipse: Array, shape: tuple[int, ...]) -> tuple[int, int, int, int]
     return int(left), int(top), int(right), int(bottom)
 
 
-def _draw_trace(picture: Array | Image, trace: dict[str, Array], corner: Array) -> None:
+def _draw_trace(picture: Array | Image, trace: dict[str, Array], corner: Array,
+                scale: int) -> None:
     def place(points: Array) -> Array:
-        magnified = (np.atleast_2d(points) - corner + 0.5) * MAGNIFICATION - 0.5
+        magnified = (np.atleast_2d(points) - corner + 0.5) * scale - 0.5
         return np.round(magnified * 2**SUBPIXEL_BITS).astype(np.int32)
 
     cv2.polylines(picture, [place(trace["ellipse"])], isClosed=True, color=GREEN, thickness=1,
@@ -56,7 +57,7 @@ def _draw_trace(picture: Array | Image, trace: dict[str, Array], corner: Array) 
 
 
 def _as_data(picture: Array | Image) -> str:
-    whole, blob = cv2.imencode(".png", picture)
+    whole, blob = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 88])
     if not whole:
         raise ValueError("the picture cannot be encoded")
-    return "data:image/png;base64," + base64.b64encode(blob.tobytes()).decode()
+    return "data:image/jpeg;base64," + base64.b64encode(blob.tobytes()).decode()

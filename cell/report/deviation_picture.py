@@ -15,7 +15,8 @@ from cell.core.documents.result import Feature
 COLOURS = {"in_tolerance": "#2a9d5c", "out_of_tolerance": "#d1343c", "uncertain": "#d9901a",
            "not_measured": "#7a7f87"}
 SIDES = (("x", "y", "from above"), ("x", "z", "from the side"), ("y", "z", "from the front"))
-ARROW_SHARE = 0.12  # of the picture's width, for the longest arrow
+ARROW_SHARE = 0.1  # of the picture's width, for a typical arrow
+TYPICAL, CAP = 80, 2.0  # percentile that sets the scale; longer arrows are cut at CAP times it
 
 
 def draw_deviations(features: Sequence[Feature], holes: Sequence[Hole]) -> str:
@@ -33,16 +34,20 @@ def _draw_side(axes: Axes, features: Sequence[Feature], holes: dict[str, Hole],
     at = np.array([_pick(holes[feature.id].centre, side) for feature in features])
     shift = np.array([[(feature.deviation or {}).get(axis, 0.0) for axis in side]
                       for feature in features])
-    longest = float(np.abs(shift).max(initial=1e-9))
-    scale = ARROW_SHARE * float(np.ptp(at, axis=0).max()) / longest
+    length = np.linalg.norm(shift, axis=1)
+    typical = max(float(np.percentile(length, TYPICAL)), 1e-3)
+    scale = ARROW_SHARE * float(np.ptp(at, axis=0).max()) / typical
+    shift = shift * np.minimum(1.0, CAP * typical / np.maximum(length, 1e-9))[:, None]
     colours = [COLOURS[feature.verdict] for feature in features]
     axes.scatter(*at.T, s=26, c=colours, zorder=3, edgecolors="white", linewidths=0.6)
-    axes.quiver(*at.T, *(shift * scale).T, color=colours, angles="xy", scale_units="xy", scale=1,
-                width=0.005, zorder=2)
+    arrows = axes.quiver(*at.T, *shift.T, color=colours, angles="xy", scale_units="xy",
+                         scale=1.0 / scale, width=0.005, zorder=2)
+    axes.quiverkey(arrows, 0.85, 1.03, typical, f"{typical:.2f} mm", labelpos="E",
+                   fontproperties={"size": 8})
     for feature, place in zip(features, at, strict=True):
         if feature.verdict != "in_tolerance":
             axes.annotate(feature.id, place, xytext=(4, 4), textcoords="offset points", fontsize=8)
-    axes.set_xlabel(f"{side[0]} (mm), longest arrow {longest:.2f} mm", fontsize=8)
+    axes.set_xlabel(f"{side[0]} (mm)", fontsize=8)
     axes.set_ylabel(f"{side[1]} (mm)", fontsize=8)
     axes.tick_params(labelsize=7)
     axes.set_aspect("equal", adjustable="datalim")
@@ -55,6 +60,7 @@ def _pick(point: np.ndarray, side: tuple[str, str]) -> list[float]:
 
 def _as_svg(figure: Figure) -> str:
     page = io.StringIO()
-    figure.savefig(page, format="svg", metadata={"Date": None, "Creator": None})
+    figure.savefig(page, format="svg",
+                   metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     text = page.getvalue()
     return text[text.index("<svg"):]

@@ -1,0 +1,32 @@
+"""`cell report`: the report of a body, made again from its recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from cell.core.documents.papers import Papers
+from cell.core.errors import RecordingError
+from cell.recording import read
+from cell.report.body import BodyRun, body_report
+
+
+def report_log(log: Path, output: Path | None = None) -> Path:
+    """Write the HTML report of a recording, beside it unless told otherwise.
+
+    Raises:
+        DocumentError: the recording cannot be read.
+        RecordingError: the report cannot be written.
+    """
+    recording = read(log)
+    papers = Papers.parse(recording.start.papers, recording.start.set_id)
+    page = body_report(BodyRun(recording.start, recording.holes, recording.stop, papers.holes))
+    return write_page(page, output or log.with_suffix(".html"))
+
+
+def write_page(page: str, path: Path) -> Path:
+    """Write a page and return where it is; RecordingError where it cannot be written."""
+    try:
+        path.write_text(page, encoding="utf-8")
+    except OSError as error:
+        raise RecordingError(f"the report {path} cannot be written: {error.strerror}") from error
+    return path
