@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from cell.core.geometry import Array, Plane
 
+ALMOST = 1e-9  # of normalised coordinates: one step further, and nothing is left to correct
 NEWTON_STEPS = 6  # quadratic: four suffice for the lenses met, two are for the others
 
 
@@ -52,6 +53,8 @@ class CameraModel:
             f, g, determinant = f - x_d, g - y_d, f_x * g_y - f_y * g_x
             x = x - (g_y * f - f_y * g) / determinant
             y = y - (f_x * g - g_x * f) / determinant
+            if max(np.abs(f).max(initial=0.0), np.abs(g).max(initial=0.0)) < ALMOST:
+                break
         return np.stack([x, y], axis=-1)
 
     def pixel_by_normalised(self, normalised: ArrayLike) -> Array:

@@ -12,6 +12,7 @@ import numpy as np
 
 from cell.core.geometry import Array
 from cell.metrology.joint_rows import (
+    CENTRE,
     FORM,
     NORMAL,
     RADIUS,
@@ -25,7 +26,7 @@ from cell.metrology.joint_rows import (
 )
 
 MOST_STEPS = 12
-STILL = 1e-7  # mm and rad: far below anything that can be measured
+STILL = 1e-5  # mm: far below anything that can be measured
 HUBER = 3.0  # single points beyond so many sigma lose weight
 
 
@@ -109,16 +110,21 @@ class Solution:
 
 def solve(problem: Problem, start: Circle) -> Solution:
     """Solve the least squares from a start; converges quadratically from the conic's answer."""
-    circle = start
+    solution, step = _step(problem, start)
     for _ in range(MOST_STEPS):
-        information, slope = _normal_equations([*problem.seen(circle), *problem.known(circle)])
-        step: Array = np.linalg.solve(information, -slope).astype(np.float64)
-        circle = circle.moved(step)
-        if np.abs(step[:RADIUS]).max() < STILL:
+        if np.abs(step[CENTRE]).max() < STILL:
             break
+        solution, step = _step(problem, solution.circle)
+    return solution
+
+
+def _step(problem: Problem, circle: Circle) -> tuple[Solution, Array]:
+    """Take one step of Gauss-Newton; what is nearly still is differentiated well enough."""
     seen, known = problem.seen(circle), problem.known(circle)
-    covariance = np.linalg.inv(_normal_equations([*seen, *known])[0])
-    return Solution(circle, np.asarray(covariance, dtype=np.float64), seen, known)
+    information, slope = _normal_equations([*seen, *known])
+    covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
+    step = -covariance @ slope
+    return Solution(circle.moved(step), covariance, seen, known), step
 
 
 def _normal_equations(blocks: list[Known]) -> tuple[Array, Array]:

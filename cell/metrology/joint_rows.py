@@ -93,8 +93,9 @@ class Sight:
 
     def moved_along(self, toward: Array, distance: Array) -> Array:
         """Move the points in the image (px) and return their rays (n, 3)."""
-        step = np.einsum("nij,nj->ni", self.normalised_by_pixel, toward * distance[:, None])
-        return self.rays + np.pad(step, ((0, 0), (0, 1)))
+        moved = self.rays.copy()
+        moved[:, :2] += np.einsum("nij,nj,n->ni", self.normalised_by_pixel, toward, distance)
+        return moved
 
 
 @dataclass(frozen=True, eq=False)
