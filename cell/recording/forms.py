@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cache
 from types import NoneType, UnionType
@@ -50,7 +50,8 @@ def _numbers(value: np.ndarray[Any, Any] | np.generic) -> Plain:
 
 def as_recorded(record: Value) -> Value:
     """Return a record as it would come back from a recording."""
-    form = form_of(type(record))
+    kind: Value = type(record)
+    form = form_of(kind)
     return form.value(form.plain(record))
 
 
@@ -62,7 +63,7 @@ def pixel_hash(image: Image) -> str:
 
 
 @cache
-def form_of(kind: Hashable) -> Form:
+def form_of(kind: Value) -> Form:
     """Return the form of a type: a number, text, array, transform, record, or what is made of them.
 
     Raises:

@@ -7,10 +7,12 @@ from __future__ import annotations
 import hashlib
 import platform
 from importlib.metadata import version
+from pathlib import Path
 
 import cv2
 import numpy as np
 
+import cell
 from cell import __version__
 
 PACKAGES = ("numpy", "scipy", "rerun-sdk", "pyarrow", "pydantic")
@@ -20,12 +22,23 @@ def collect_versions() -> dict[str, str]:
     """Collect the versions that a start record holds, as texts by name."""
     return {
         "cell": __version__,
+        "cell_code": _code_hash(),
         "python": platform.python_version(),
         **{package: version(package) for package in PACKAGES},
         "opencv": cv2.__version__,
         "system": f"{platform.system()} {platform.machine()} {'-'.join(platform.libc_ver())}",
         **_kernels(),
     }
+
+
+def _code_hash() -> str:
+    """Hash the sources of all that enters a number: the floors `core` and `metrology`."""
+    root = Path(cell.__file__).parent
+    digest = hashlib.sha256()
+    for floor in ("core", "metrology"):
+        for source in sorted((root / floor).rglob("*.py")):
+            digest.update(f"{source.relative_to(root)}\n".encode() + source.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def _kernels() -> dict[str, str]:

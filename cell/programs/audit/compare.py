@@ -77,9 +77,13 @@ def compare(where: str, recorded: Anything, recomputed: Anything,
 
 
 def _parts(value: Anything) -> dict[str, Anything] | None:
-    """Take apart what has named or numbered parts; a row of numbers has none."""
+    """Take apart what has named or numbered parts; a row of numbers has none.
+
+    The outcome behind a feature is left out: it is compared with its hole.
+    """
     if is_dataclass(value):
-        return {field.name: getattr(value, field.name) for field in fields(value)}
+        return {field.name: getattr(value, field.name) for field in fields(value)
+                if not (isinstance(value, Feature) and field.name == "outcome")}
     if isinstance(value, Mapping):
         return dict(value)
     if isinstance(value, tuple | list) and not all(isinstance(each, float) for each in value):
@@ -107,8 +111,8 @@ def _compare_numbers(where: str, recorded: Array, recomputed: Array, limit: Anyt
     worst = np.unravel_index(np.argmax(gap - limits), gap.shape)
     level: Level = "reproduced" if (gap <= limits).all() else "differs"
     return Comparison(recorded.size, Difference(
-        where, level, _words(recorded[worst]), _words(recomputed[worst]), float(gap[worst]),
-        float(limits[worst])))
+        where, level, _words(recorded[worst]), _words(recomputed[worst]),
+        float(gap[worst]) if np.isfinite(gap[worst]) else None, float(limits[worst])))
 
 
 def _is_number(value: Anything) -> bool:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -79,9 +80,10 @@ def _doubled(seals: Mapping[Path, Seal]) -> Iterator[Finding]:
 
 def _gaps(row: list[Path], seals: Mapping[Path, Seal]) -> Iterator[Finding]:
     """Each seal must name the one before it in the row."""
-    if row and seals[row[0]].previous is not None:
-        yield Finding("missing", seals[row[0]].previous.file, f"comes before {row[0].name}")
-    for before, path in zip(row, row[1:], strict=False):
+    absent = seals[row[0]].previous if row else None
+    if absent is not None:
+        yield Finding("missing", absent.file, f"comes before {row[0].name}")
+    for before, path in pairwise(row):
         seal, earlier = seals[path], seals[before]
         if seal.previous is None:
             yield Finding("foreign", path.name, "begins a row of its own")

@@ -30,8 +30,11 @@ Watch: TypeAlias = Callable[[int], None]
 PLAIN = Question()
 
 
-def audit_log(log: Path, question: Question = PLAIN, watch: Watch = lambda _: None
-              ) -> LogAudit:
+def unwatched(_holes: int) -> None:
+    """Watch nothing."""
+
+
+def audit_log(log: Path, question: Question = PLAIN, watch: Watch = unwatched) -> LogAudit:
     """Audit one recording. Never raises for what is wrong with it: that is the answer.
 
     Args:

@@ -67,11 +67,13 @@ class LogAudit:
         return "reproduced" if self.numbers["reproduced"] else "identical"
 
     def exit_code(self, strict: bool = False) -> int:
-        """Return 0 where the recording holds, 1 where a number differs, 2 where it was refused.
+        """Return 0 where the recording holds, 2 where it was refused, 1 where a number differs or,
+        in a what-if, a verdict turns.
 
         Args:
             strict: count what is reproduced but not identical as different.
         """
         if self.answer == "refused":
             return 2
-        return int(self.answer == "differs" or (strict and self.answer == "reproduced"))
+        different = self.answer == "differs" or (strict and self.answer == "reproduced")
+        return int(different or any(change.turns for change in self.changes))

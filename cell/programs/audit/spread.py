@@ -10,19 +10,19 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from cell.core.errors import DeviceError, DocumentError
-from cell.programs.audit.log import audit_log
+from cell.programs.audit.log import Watch, audit_log, unwatched
 from cell.programs.audit.question import Question
 from cell.programs.audit.report import LogAudit
 
 
-def audit_each(logs: Sequence[Path], question: Question, executor: Executor | None
-               ) -> Iterator[LogAudit]:
+def audit_each(logs: Sequence[Path], question: Question, executor: Executor | None = None,
+               watch: Watch = unwatched) -> Iterator[LogAudit]:
     """Audit recordings one by one, or through an executor as they are done.
 
     A recording that takes its process down is refused; the others go on.
     """
     if executor is None:
-        yield from (audit_log(log, question) for log in logs)
+        yield from (audit_log(log, question, watch) for log in logs)
         return
     futures = {executor.submit(audit_log, log.resolve(), question): log for log in logs}
     for future in as_completed(futures):
