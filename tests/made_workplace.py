@@ -4,6 +4,8 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
+import pytest
+
 from cell.archive.papers import read_papers
 from cell.core.documents.papers import Papers
 
@@ -46,3 +48,10 @@ class Workplace:
 
     def papers(self) -> Papers:
         return read_papers(self.job, None, self.folder / "calibration").parse()
+
+
+@pytest.fixture
+def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workplace:
+    """A working folder with a copy of the demo's documents; the test runs in it."""
+    monkeypatch.chdir(tmp_path)
+    return Workplace.in_folder(tmp_path)

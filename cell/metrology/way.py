@@ -1,25 +1,30 @@
 """The way of the sensor: every joint move sampled, and held against limits and obstacles.
 
 A joint move is straight in joint space, so it is checked there: sampled finely, the sensor's hull
-carried along. The hull is the sensor's points and the lines between every two of them. The arm
-itself is not checked, only the sensor.
+carried along. The hull is the convex body of the sensor's points, filled with a grid; what lies
+between two samples is covered by the clearance that is asked for. The arm itself is not checked,
+only the sensor.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations, pairwise
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
+from cell.core.documents.base import Vector3
 from cell.core.documents.station import Box, Limits, RobotSettings
 from cell.core.geometry import Array
 from cell.core.kinematics import Arm
 from cell.core.ports import Joints
 
 STEP = np.radians(0.5)  # between two samples, of the joint that turns most
-HULL_STEP = 25.0  # mm between two points on a line of the hull
+GRID = 20.0  # mm between two points of the hull
+CLEARANCE = 25.0  # mm to every box: half a cell's diagonal (17), and half a step at 1.5 m (7)
 
 
 @dataclass(frozen=True)
@@ -64,13 +69,14 @@ def check_leg(leg: Leg, limits: Limits, arm: Arm) -> Passage:
     """Check one joint move along its whole path; joint limits at its end, where they bind."""
     path = _samples(*leg.joints)
     flanges = arm.flanges(path)
-    hull = _hull(limits.sensor_points)
+    hull = _fill_hull(limits.sensor_points)
     points = hull @ np.swapaxes(flanges[:, :3, :3], 1, 2) + flanges[:, None, :3, 3]
     clearance, obstacle = _clearance(points, limits.keep_out)
     margin = float(arm.singularity_margins(path).least_deg.min())
     problems = [*find_limit_problems(leg.joints[1], limits), *_outside(points, limits.workspace)]
-    if clearance <= 0.0:
-        problems.append(f"the sensor enters the keep-out box {obstacle!r}")
+    if clearance < CLEARANCE:
+        problems.append(f"the sensor comes within {clearance:.0f} mm of the keep-out box "
+                        f"{obstacle!r}; expected at least {CLEARANCE:g}")
     if margin < limits.singularity_margin_deg:
         problems.append(f"comes within {margin:.1f} degrees of a singularity; "
                         f"expected at least {limits.singularity_margin_deg:g}")
@@ -90,21 +96,49 @@ def _samples(start: Joints, end: Joints) -> Array:
     return np.linspace(start, end, count)
 
 
-def _hull(corners: Sequence[Sequence[float]]) -> Array:
-    """Fill the lines between all points of the sensor (flange frame): (n, 3)."""
+@lru_cache(maxsize=8)
+def _fill_hull(corners: tuple[Vector3, ...]) -> Array:
+    """Fill the convex hull of the sensor's points (flange frame): (n, 3)."""
     points = np.array(corners or [(0.0, 0.0, 0.0)], dtype=np.float64)
-    lines = [np.linspace(a, b, int(np.linalg.norm(a - b) / HULL_STEP) + 2)
+    lines = [np.linspace(a, b, int(np.linalg.norm(a - b) / GRID) + 2)
              for a, b in combinations(points, 2)]
-    return np.vstack([points, *lines])
+    return np.vstack([points, *lines, _fill_inside(points)])
+
+
+def _fill_inside(points: Array) -> Array:
+    """A grid inside of the hull; empty where the points are flat or few."""
+    try:
+        faces = ConvexHull(points).equations
+    except (QhullError, ValueError):
+        return np.empty((0, 3))
+    ranges = [np.arange(low, high, GRID) for low, high in zip(points.min(0), points.max(0),
+                                                              strict=True)]
+    grid = np.stack(np.meshgrid(*ranges), axis=-1).reshape(-1, 3)
+    return grid[(grid @ faces[:, :3].T + faces[:, 3] <= 0.0).all(axis=1)]
 
 
 def _clearance(points: Array, boxes: Sequence[Box]) -> tuple[float, str]:
-    """Measure the distance to the nearest box: 0 inside of it."""
-    distances = {box.name: float(np.linalg.norm(np.maximum(
-        np.maximum(np.array(box.min) - points, points - np.array(box.max)), 0.0), axis=-1).min())
-        for box in boxes}
-    nearest = min(distances, key=distances.__getitem__, default="")
-    return distances.get(nearest, np.inf), nearest
+    """Find the distance of points (samples, n, 3) to the nearest box, 0 inside, and its name.
+
+    Boxes are taken in the order of a lower bound from the hull's ball, most not at all.
+    """
+    centres = points.mean(axis=1)
+    radius = float(np.linalg.norm(points[0] - centres[0], axis=1).max())
+    bounds = sorted(((_distance(centres, box) - radius, box) for box in boxes),
+                    key=lambda bound: bound[0])
+    least, nearest = np.inf, ""
+    for bound, box in bounds:
+        if bound >= least:
+            break
+        if (distance := _distance(points, box)) < least:
+            least, nearest = distance, box.name
+    return least, nearest
+
+
+def _distance(points: Array, box: Box) -> float:
+    low, high = np.array(box.min), np.array(box.max)
+    outside = np.maximum(np.maximum(low - points, points - high), 0.0)
+    return float(np.sqrt(np.einsum("...i,...i", outside, outside).min()))
 
 
 def _outside(points: Array, workspace: Box) -> Iterator[str]:
