@@ -15,6 +15,7 @@ from cell.cli.check import check
 from cell.cli.compare import compare
 from cell.cli.error_model import error_model
 from cell.cli.locate import locate
+from cell.cli.repair import repair
 from cell.cli.report import report
 from cell.cli.run import run
 from cell.cli.seal_key import seal_key_app
@@ -41,6 +42,7 @@ app.command()(locate)
 app.command()(error_model)
 app.add_typer(study_app)
 app.command()(audit)
+app.command()(repair)
 app.add_typer(seal_key_app)
 app.command()(check)
 app.command()(compare)
