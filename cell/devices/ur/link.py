@@ -44,6 +44,7 @@ class WorkerLink:
         self._questions, self._answers = self._process.stdin.fileno(), self._process.stdout.fileno()
         self._received = b""
         self._asked = self._answered = 0
+        self._killed = False
         self._lock = threading.Lock()
         try:
             self._wait(0, START_SECONDS)
@@ -71,6 +72,8 @@ class WorkerLink:
         if not self._lock.acquire(timeout=limit):
             raise RefusedError("another thread is asking the robot", {})
         try:
+            if self._killed:
+                raise WorkerLostError("the robot's client has ended", device="robot")
             self._asked += 1
             request = {"id": self._asked, "do": deed, "with": arguments}
             with contextlib.suppress(BrokenPipeError):  # the wait finds out why
@@ -81,6 +84,7 @@ class WorkerLink:
 
     def kill(self) -> None:
         """End the process and wait for its end."""
+        self._killed = True
         self._process.kill()
         with contextlib.suppress(subprocess.TimeoutExpired, OSError):
             self._process.communicate(timeout=2.0)

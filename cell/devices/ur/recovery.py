@@ -33,6 +33,8 @@ def clear_stop(dashboard: Dashboard) -> None:
         _unlock(dashboard)
     elif state == "emergency_stop":
         dashboard.ask("restart safety")
+    elif state is not None:
+        raise stopped(state, "it is still stopped")
     if not _wait(lambda: safety_mode(dashboard) in MAY_MOVE, SAFETY_SECONDS):
         raise stopped(state_of_safety(safety_mode(dashboard)) or "lost", "it is still stopped")
     _power_up(dashboard)

@@ -60,9 +60,12 @@ class UrRobot:
 
     def open(self) -> RobotIdentity:
         """Connect, check that the arm may move, and say who it is."""
-        found = check_controller(self._address, self._dashboard, self._settings.model,
-                                 self._settings.serial)
-        return self._connect(found)
+        try:
+            return self._connect(check_controller(self._address, self._dashboard,
+                                                  self._settings.model, self._settings.serial))
+        except DeviceError:
+            self.close()
+            raise
 
     def move_to(self, path: Sequence[Move]) -> RobotState:
         """Go through joint moves in order and return the state reached, verified at rest.

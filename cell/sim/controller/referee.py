@@ -3,8 +3,8 @@
 A line in, a line out. Switches take `on` or `off`: safeguard, emergency_stop, local_mode,
 freeze_stream (no cyclic data), stall (the same cycle again and again), freeze (nothing is read or
 answered: a pulled cable), refuse_upload. Events: protective_stop, pause, kill_program, other_tcp
-(100 mm further out), cut (every client's connection ends), garbage, half_package, die, truth
-(answers JSON).
+(100 mm further out), cut (every client's connection ends), garbage, half_package (and then
+silence), restart (as if just started), die, truth (answers JSON).
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from cell.sim.controller.controller import Controller
 
 if TYPE_CHECKING:
     from cell.sim.controller.server import Server
@@ -38,7 +40,8 @@ class Referee:
             "kill_program": controller.end_program, "cut": server.cut,
             "other_tcp": lambda: controller.set_tcp(np.array([0.0, 0.0, 0.1, 0.0, 0.3, 0.0])),
             "garbage": lambda: server.broadcast(os.urandom(64)),
-            "half_package": lambda: server.broadcast(b"\x01\x00U\x01half"),
+            "half_package": self._half_package,
+            "restart": lambda: server.restart(Controller(controller.model, controller.speed)),
             "die": lambda: os._exit(1),
         }
 
@@ -67,6 +70,10 @@ class Referee:
         self._server.controller.remote_control = not local
         if local:
             self._server.controller.end_program()
+
+    def _half_package(self) -> None:
+        self._server.broadcast(b"\x01\x00U\x01")
+        self._server.faults.add("freeze_stream")
 
     def _fault(self, name: str) -> Callable[[bool], None]:
         def switch(active: bool) -> None:

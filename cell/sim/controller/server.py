@@ -25,24 +25,29 @@ class Server:
     """A controller at an address. `run` serves until `alive` says no."""
 
     def __init__(self, controller: Controller, address: str, rate: float = 125.0) -> None:
-        self.controller = controller
         self.address = address
-        self.faults: set[str] = set()
-        self.uploads = 0
         self._period = 1.0 / rate
         self._rate = rate
         self._selector = selectors.DefaultSelector()
         self._sessions: dict[Connection, RtdeSession] = {}
         self._clients: set[Connection] = set()
         self._taken: set[str] = set()
+        self._now = time.monotonic()
+        self.restart(controller)
+        self._listen()
+
+    def restart(self, controller: Controller) -> None:
+        """Begin anew with a controller that knows nothing of what was before."""
+        self.cut()
+        controller.wall = self._commanded = self._now
+        self.controller = controller
+        self.faults: set[str] = set()
+        self.uploads = 0
         self._registers: Values = {}
+        self._last: Values = {}
         self._program: ControlProgram | None = None
         self._starting: float | None = None
-        self._commanded = self._now = time.monotonic()
-        self._last: Values = {}
         self._dashboard, self._referee = Dashboard(controller), Referee(self)
-        controller.wall = self._now
-        self._listen()
 
     # --- the ports --------------------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""A controller of its own for every test, and the driver that talks to it."""
+"""A controller as new for every test, and the driver that talks to it."""
 
 import json
 
@@ -18,8 +18,22 @@ def settings():
     return RobotSettings(driver="sim", model="ur10e", digital_output_ring=2, digital_output_laser=5)
 
 
+@pytest.fixture(scope="module")
+def running_emulator():
+    with EmulatedController("ur10e", speed=SPEED) as running:
+        yield running
+
+
 @pytest.fixture
-def emulator():
+def emulator(running_emulator):
+    """A controller as if it had just been started."""
+    running_emulator.tell_referee("restart")
+    return running_emulator
+
+
+@pytest.fixture
+def mortal_emulator():
+    """A controller that the test may kill."""
     with EmulatedController("ur10e", speed=SPEED) as running:
         yield running
 
