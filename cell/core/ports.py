@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol, TypeAlias
 
-from cell.core.documents.result import Outcome
 from cell.core.errors import DeviceError
 from cell.core.geometry import Transform
 from cell.core.observation import Image, Light
@@ -132,31 +131,6 @@ class Operator(Protocol):
         """Ask for a line of text."""
 
 
-class Supervisor(Protocol):
-    """Who stands above a run of one body, told of each hole and asked what to do.
-
-    `cell run` needs none; a shift's supervisor knows the takt, the line and the operator.
-    """
-
-    def hole_done(self, index: int, count: int, outcome: Outcome) -> None:
-        """Hear of hole `index` (from 0) of `count`, as it was measured or not."""
-
-    def next_hole(self, remaining: Sequence[str]) -> str | None:
-        """Give the reason why `remaining[0]` is to be skipped, or None to measure it.
-
-        Raises:
-            DeviceError: the body is to be left here (`k` holes refused in a row, a missing datum).
-            KeyboardInterrupt: the line or the operator aborts the body.
-        """
-
-    def may_resume(self, error: DeviceError) -> bool:
-        """Ask a person whether the body goes on at the hole where `error` stopped it.
-
-        Called with the robot at rest and the lights off; blocks until somebody has answered. True
-        says that the cause is gone and that the body has not moved.
-        """
-
-
 LineVerdict: TypeAlias = Literal["ok", "nok", "uncertain", "incomplete"]
 Command: TypeAlias = Literal["start", "abort", "reset", "bypass", "end_bypass", "stop"]
 Refusal: TypeAlias = Literal["", "unknown_type", "no_body", "no_body_id", "not_ready", "master_due",
@@ -164,7 +138,7 @@ Refusal: TypeAlias = Literal["", "unknown_type", "no_body", "no_body_id", "not_r
 Fault: TypeAlias = Literal[
     "", "protective_stop", "safeguard_stop", "emergency_stop", "local_mode", "paused", "robot_lost",
     "camera_lost", "lights_lost", "laser_dark", "disk_full", "recording_failed", "holes_refused",
-    "datum_missing", "master_failed", "body_moved", "program_fault"]
+    "datum_missing", "master_failed", "results_lost"]
 """Why the cell stands; each is a state of the shift and a code on the line."""
 
 

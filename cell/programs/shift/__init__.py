@@ -1,0 +1,1 @@
+"""The shift: bodies after bodies, unattended, right verdicts, nothing lost."""

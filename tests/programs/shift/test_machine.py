@@ -1,0 +1,294 @@
+"""The shift's states, orders, faults and what it leaves in the ledger, over recorded bodies."""
+
+import errno
+
+import pytest
+from made_cell import made_job
+from made_line import When
+
+from cell.core.documents.shift import BodyType, FaultRules, MasterCheck, ShiftDocument, Takt
+from cell.core.errors import DeviceError, RecordingError
+from cell.core.ports import Order, RobotStoppedError
+from cell.programs.shift.clock import WatchedClock
+
+
+def start(body, body_type=1, **changes):
+    return Order("start", body, body_type, **changes)
+
+
+STOP, RESET, ABORT = Order("stop"), Order("reset", operator="Meier"), Order("abort")
+
+
+def once(error, body, hole):
+    """Plant one failure before one hole of one body."""
+    waiting = [error]
+
+    def plant(at_body, at_hole):
+        if (at_body, at_hole) == (body, hole) and waiting:
+            raise waiting.pop()
+    return plant
+
+
+def test_bodies_come_are_measured_and_released(made):
+    made.cell.deviation = lambda body, hole: 0.9 if (body, hole) == (2, 3) else 0.1
+    made.run(start("A"), start("B"), start("C"), STOP)
+    assert made.verdicts == [("A", "ok"), ("B", "nok"), ("C", "ok")]
+    assert [r.sequence for r in made.line.results] == [1, 2, 3]
+    assert [(v["body_id"], v["state"], v["verdict"]) for v in made.visits] == [
+        ("A", "released", "in_tolerance"), ("B", "released", "out_of_tolerance"),
+        ("C", "released", "in_tolerance")]
+    assert [b["body_id"] for b in made.bodies] == ["A", "B", "C"]
+    assert made.bodies[1]["out_of_tolerance"] == 1 and made.line.results[1].worst == \
+        pytest.approx(0.9)
+    assert made.states == ["ready", "measuring", "result"] * 3 + ["ready", "stopped"]
+    assert all(refusal == "" for _, refusal in made.line.answers) and made.cell.homes == 3
+
+
+def test_only_approved_papers_give_production_results(made):
+    made.run(start("A"), STOP)
+    made.approved = True
+    made.run(start("B"), STOP)
+    assert [(v["body_id"], v["trial"]) for v in made.visits] == [("A", True), ("B", False)]
+    assert [b["trial"] for b in made.bodies] == [True, False]
+    assert [r.trial for r in made.line.results] == [True, False]
+
+
+@pytest.mark.parametrize(("order", "refusal"), [
+    (start("A", 7), "unknown_type"), (start(""), "no_body_id"),
+    (start("A", body_present=False), "no_body"), (RESET, "nothing_to_do"),
+    (ABORT, "nothing_to_do"), (Order("end_bypass"), "nothing_to_do")])
+def test_what_cannot_be_is_refused_with_a_code_and_no_verdict(made, order, refusal):
+    made.run(When("ready", order), STOP)
+    assert made.line.answers[0] == (order, refusal)
+    assert made.line.results == [] and made.visits == []
+
+
+def test_a_refused_start_is_in_the_ledger(made):
+    made.run(start("A", 7), STOP)
+    assert made.notices == [("refused", "body 'A' of type 7: unknown_type")]
+
+
+def test_a_result_is_held_and_nothing_comes_in_before_it_is_acknowledged(made):
+    made.line.patience = 4
+    made.run(start("A"), When("result", start("B")), STOP)
+    assert ("B", "result_held") in [(o.body_id, r) for o, r in made.line.answers]
+    assert [r.body_id for r in made.line.results] == ["A"]
+
+
+def test_a_master_is_due_first_and_again_after_every_so_many(made):
+    made.change(master=MasterCheck(type=9, job="master.yaml", every=2, limit_mm=0.15))
+    made.cell.deviation = lambda body, hole: 0.1
+    made.run(start("A"), start("M", 9), start("A"), start("B"), start("C"), start("M", 9),
+             start("C"), STOP)
+    assert [(v["body_id"], v["kind"]) for v in made.visits] == [
+        ("M", "master"), ("A", "body"), ("B", "body"), ("M", "master"), ("C", "body")]
+    assert [refusal for _, refusal in made.line.answers].count("master_due") == 2
+    assert made.visits[0]["reason"].startswith("master check passed: 0.100 mm")
+    assert made.shift.done == 3 and made.states[0] == "master_due"
+
+
+def test_a_master_out_of_its_limit_stops_production_until_one_passes(made):
+    made.change(master=MasterCheck(type=9, job="master.yaml", every=5, limit_mm=0.15))
+    made.cell.deviation = lambda body, hole: 0.2 if body == 1 else 0.1
+    made.run(start("M", 9), When("master_failed", start("A")), RESET, start("A"), start("M", 9),
+             start("A"), STOP)
+    assert made.verdicts == [("M", "nok"), ("M", "ok"), ("A", "ok")]
+    assert [(f["state"], f["recovered_by"]) for f in made.faults] == [("master_failed", "Meier")]
+    assert [r for _, r in made.line.answers] == ["", "not_ready", "", "master_due", "", "", ""]
+
+
+def test_a_master_with_a_missing_hole_has_not_passed(made):
+    made.change(master=MasterCheck(type=9, job="master.yaml"))
+    made.cell.deviation = lambda body, hole: "blurred" if hole == 2 else 0.0
+    made.run(start("M", 9), RESET, STOP)
+    assert made.verdicts == [("M", "incomplete")] and len(made.faults) == 1
+
+
+STOPS = [(RobotStoppedError("stopped", state=state), state)
+         for state in ("protective_stop", "safeguard_stop", "emergency_stop")]
+LOST = [(RobotStoppedError("gone", state="lost"), "robot_lost"),
+        (DeviceError("no image", device="camera"), "camera_lost"),
+        (DeviceError("not on", device="lights"), "lights_lost")]
+
+
+@pytest.mark.parametrize(("error", "state"), STOPS + LOST)
+def test_a_fault_is_a_named_state_and_the_body_goes_on_where_it_stopped(made, error, state):
+    made.cell.plant = once(error, body=1, hole=3)
+    made.run(start("A"), When(state, start("B")), RESET, STOP)
+    assert (start("B"), "not_ready") in made.line.answers
+    assert state in made.states and made.verdicts == [("A", "ok")]
+    (fault,) = made.faults
+    assert (fault["state"], fault["recovered_by"], fault["sequence"]) == (state, "Meier", 1)
+    shown = next(board for board in made.boards if board.state == state)
+    assert shown.fault == state and shown.instruction and shown.busy and not shown.clear
+    assert made.cell.safe >= 2 and made.cell.recovered == 1
+    assert made.bodies[0]["measured"] == 6
+
+
+def test_a_body_that_has_moved_is_given_up_and_incomplete(made):
+    made.cell.plant = once(RobotStoppedError("bump", state="protective_stop"), body=1, hole=3)
+    made.run(start("A"), ABORT, RESET, start("B"), STOP)
+    assert made.verdicts == [("A", "incomplete"), ("B", "ok")]
+    assert (made.bodies[0]["status"], made.bodies[0]["measured"], made.bodies[0]["missing"]) \
+        == ("fault", 3, 3)
+
+
+def test_a_cause_that_is_still_there_is_not_reset(made):
+    made.cell.plant = once(DeviceError("no image", device="camera"), body=1, hole=0)
+    made.cell.unrecoverable = [DeviceError("still no image", device="camera")]
+    made.run(start("A"), RESET, RESET, STOP)
+    assert [r for o, r in made.line.answers if o == RESET] == ["not_ready", ""]
+    assert any("still no image" in board.detail for board in made.boards)
+    assert made.verdicts == [("A", "ok")]
+
+
+def test_a_fault_on_the_way_home_keeps_the_verdict_and_the_zone(made):
+    made.cell.plant = once(RobotStoppedError("guard", state="safeguard_stop"), body=1, hole="home")
+    made.run(start("A"), RESET, STOP)
+    assert made.verdicts == [("A", "ok")] and made.cell.homes == 1
+    assert not any(board.clear for board in made.boards if board.state == "safeguard_stop")
+    assert made.boards[-1].clear
+
+
+def test_holes_refused_in_a_row_are_a_fault_of_the_cell(made):
+    made.change(faults=FaultRules(refused_in_a_row=3))
+    made.cell.deviation = lambda body, hole: "not_round" if body == 1 and hole > 1 else 0.0
+    made.run(start("A"), RESET, start("B"), STOP)
+    (fault,) = made.faults
+    assert fault["state"] == "holes_refused" and "H4 (not_round)" in fault["detail"]
+    assert made.verdicts == [("A", "incomplete"), ("B", "ok")]
+    assert made.bodies[0]["missing"] == 4
+
+
+def test_refusals_at_the_last_holes_and_a_dark_laser_are_seen(made):
+    made.change(faults=FaultRules(refused_in_a_row=2))
+    made.cell.deviation = lambda body, hole: "no_laser" if hole >= 4 else 0.0
+    made.run(start("A"), RESET, STOP)
+    assert [f["state"] for f in made.faults] == ["laser_dark"]
+
+
+def test_scattered_refusals_are_no_fault(made):
+    made.change(faults=FaultRules(refused_in_a_row=2))
+    made.cell.deviation = lambda body, hole: "blurred" if hole % 2 else 0.0
+    made.run(start("A"), STOP)
+    assert made.faults == [] and made.verdicts == [("A", "incomplete")]
+
+
+@pytest.mark.parametrize("matters", [True, False])
+def test_a_missing_datum_is_a_fault_where_the_shift_says_so(made, matters):
+    made.change(faults=FaultRules(datum_missing=matters))
+    made.cell.jobs = {"demo.yaml": made_job(datums=["H1"])}
+    made.cell.deviation = lambda body, hole: "half_occluded" if hole == 1 else 0.0
+    made.run(start("A"), *[RESET] * matters, STOP)
+    assert [f["state"] for f in made.faults] == (["datum_missing"] if matters else [])
+    assert made.verdicts == [("A", "incomplete")]
+
+
+def test_the_line_aborts_a_body(made):
+    left = Order("abort", reason="the body left the station")
+    made.run(start("A"), When("measuring", left, hole=2), start("B"), STOP)
+    assert made.verdicts == [("A", "incomplete"), ("B", "ok")]
+    assert (made.bodies[0]["status"], made.bodies[0]["measured"]) == ("aborted", 2)
+    assert made.visits[0]["reason"] == "the body left the station"
+
+
+def test_a_full_disk_while_recording_leaves_the_body_incomplete_and_the_cell_standing(made):
+    full = RecordingError("no space left")
+    full.__cause__ = OSError(errno.ENOSPC, "No space left on device")
+    made.cell.plant = once(full, body=1, hole=2)
+    made.run(start("A"), RESET, start("B"), STOP)
+    assert [f["state"] for f in made.faults] == ["disk_full"]
+    assert made.verdicts == [("A", "incomplete"), ("B", "ok")]
+
+
+def test_a_recording_that_cannot_be_begun_waits_for_the_person(made):
+    begin, failures = made.cell.begin, [RecordingError("no room")]
+
+    def begin_later(*args, **kwargs):
+        if failures:
+            raise failures.pop()
+        return begin(*args, **kwargs)
+    made.cell.begin = begin_later
+    made.run(start("A"), RESET, STOP)
+    assert [f["state"] for f in made.faults] == ["recording_failed"]
+    assert made.verdicts == [("A", "ok")]
+
+
+def test_a_bypass_lets_bodies_pass_and_is_a_record(made):
+    made.change(bypass=made.document.bypass.model_copy(
+        update={"reasons": {"3": "sensor window broken"}}))
+    made.run(start("A"), Order("bypass", operator="17", reason="3"), start("B"), start("C"),
+             Order("end_bypass", operator="Meier"), start("D"), STOP)
+    assert made.verdicts == [("A", "ok"), ("B", "incomplete"), ("C", "incomplete"), ("D", "ok")]
+    assert [v["kind"] for v in made.visits] == ["body", "bypassed", "bypassed", "body"]
+    assert "sensor window broken" in made.visits[1]["reason"]
+    bypass = made.ledger.rows(bypasses_table())[0]
+    assert (bypass["requested_by"], bypass["reason"], bypass["ended_by"]) \
+        == ("17", "sensor window broken", "Meier")
+    assert bypass["until"] - bypass["since"] == pytest.approx(3600.0)
+
+
+def bypasses_table():
+    from cell.results.tables import bypasses
+    return bypasses
+
+
+def test_a_bypass_outlives_a_restart_but_not_its_time(made):
+    made.run(Order("bypass", operator="17", reason="x"), start("A"), STOP)
+    made.run(start("B"), STOP)
+    assert [v["kind"] for v in made.visits] == ["bypassed", "bypassed"]
+    made.clock = WatchedClock(wall=lambda: 4e9)
+    made.run(start("C"), STOP)
+    assert made.visits[-1]["kind"] == "body"
+    assert "longest time" in made.ledger.rows(bypasses_table())[0]["ended_by"]
+
+
+def test_the_takt_drops_declared_classes_and_never_another(made):
+    classes = {1: "minor", 2: "critical", 4: "minor", 5: ""}
+    made.cell.jobs = {"demo.yaml": made_job(importance=lambda n: classes.get(n, ""))}
+    made.change(takt=Takt(seconds=0.01, hole_s=1.0, reserve_s=0.0))
+    made.run(start("A"), STOP)
+    assert made.visits[0]["reason"] == "dropped for the takt: H1, H4"
+    assert made.bodies[0]["measured"] == 4 and made.verdicts == [("A", "incomplete")]
+
+
+def test_a_takt_without_droppable_holes_is_missed_rather_than_cut(made):
+    import time
+    made.change(takt=Takt(seconds=0.05, hole_s=1.0, reserve_s=0.0))
+    made.cell.plant = lambda body, hole: time.sleep(0.02)
+    made.run(start("A"), STOP)
+    assert made.verdicts == [("A", "ok")] and made.notices[0][0] == "takt"
+
+
+def test_a_critical_class_cannot_be_declared_droppable():
+    with pytest.raises(ValueError, match="never dropped"):
+        Takt(seconds=60.0, droppable=("minor", "critical"))
+
+
+def test_a_clock_that_is_set_is_noticed(made):
+    jump = [0.0]
+    import time
+    made.clock = WatchedClock(wall=lambda: time.time() - jump[0])
+    made.cell.plant = lambda body, hole: jump.__setitem__(0, 3600.0) if hole == 2 else None
+    made.run(start("A"), STOP)
+    assert made.notices == [("clock", "the clock was set back by 3600.0 s")]
+    made.clock = WatchedClock(wall=lambda: time.time() - 7200.0)
+    made.run(STOP)
+    assert "less than the last entry" in made.notices[-1][1] or \
+        "less than the last entry" in made.notices[0][1]
+
+
+def test_bodies_are_counted(made):
+    made.run(start("A"), start("B"), start("C"), bodies=2)
+    assert [v["body_id"] for v in made.visits] == ["A", "B"]
+
+
+def test_stop_ends_the_shift_after_the_body(made):
+    made.run(start("A"), When("measuring", STOP, hole=1), start("B"))
+    assert made.verdicts == [("A", "ok")]
+
+
+def test_a_type_may_not_be_named_twice():
+    with pytest.raises(ValueError, match="named once"):
+        ShiftDocument(name="x", cell="x", bodies=(BodyType(type=1, job="a"),),
+                      master=MasterCheck(type=1, job="b"))
