@@ -16,6 +16,7 @@ from cell.core.documents.station import StationDocument
 from cell.core.errors import DocumentError
 from cell.core.ports import Camera, Lights, Robot, RobotIdentity
 from cell.devices.ur import UrLights, UrRobot
+from cell.devices.video import VideoCamera
 from cell.sim.camera import SimulatedCamera
 from cell.sim.controller.process import EmulatedController
 
@@ -37,9 +38,10 @@ class Station:
     speed: float = 1.0
     world: SimulatedCamera | None = None
 
-    def pause(self, seconds: float) -> None:
-        """Wait for `seconds` of the cell's own time."""
-        time.sleep(seconds / self.speed)
+    def pause(self, seconds: float, since: float) -> None:
+        """Wait until `seconds` of the cell's own time have passed since `time.monotonic()` was so.
+        """
+        time.sleep(max(0.0, since + seconds / self.speed - time.monotonic()))
 
     def make_safe(self) -> None:
         """Switch the lights off and bring the arm to rest. Never raises."""
@@ -94,8 +96,6 @@ def _open_camera(document: StationDocument, folder: Path, address: str,
                  speed: float) -> Camera:
     camera = document.camera
     if camera.driver == "video":
-        from cell.devices.video import VideoCamera
-
         return VideoCamera(camera)
     if camera.scene is None:
         raise DocumentError("a camera with `driver: sim` needs its `scene`",

@@ -20,8 +20,6 @@ from cell.programs.inspection.look import take_view
 from cell.programs.inspection.prepare import Prepared
 from cell.programs.station import Station
 
-LIGHTS: tuple[Light, ...] = ("ring", "laser")
-
 
 class Chase:
     """Measures single holes at a station, within the time that the job allows for chasing."""
@@ -48,7 +46,11 @@ class Chase:
             dropped = NotMeasured(stop.hole.id, "dropped", "left out: the takt does not allow it")
             return HoleRecord(len(before), observation, (Attempt(0, dropped, "give_up"),))
         self._driver.go_to(self._stand(stop, body_from_predicted), stop.via)
-        return self._chase(stop, observation, len(before))
+        arrived = time.monotonic()
+        record = self._chase(stop, observation, len(before))
+        if len(record.attempts) > 1:
+            self._time_left -= (time.monotonic() - arrived) * self._station.speed
+        return record
 
     def _chase(self, stop: PlannedStop, observation: Observation, index: int) -> HoleRecord:
         camera = self._station.document.camera
@@ -56,7 +58,6 @@ class Chase:
                                          "laser": camera.exposure_laser_s}
         attempts: list[Attempt] = []
         while True:
-            begun = time.monotonic()
             views = self._look(exposures, len(attempts))
             observation = observation.with_views(views)
             outcome = self._measure(observation, stop)
@@ -64,18 +65,25 @@ class Chase:
             attempts.append(Attempt(len(observation.views), outcome, following.action))
             if following.action in ("accept", "give_up"):
                 return HoleRecord(index, observation, tuple(attempts))
-            exposures = {light: exposures[light] * following.exposure_factor[light]
-                         for light in LIGHTS}
+            exposures = {light: exposure * following.exposure_factor[light]
+                         for light, exposure in exposures.items()}
             self._step_aside(stop, views[-1], following)
-            self._time_left -= (time.monotonic() - begun) * self._station.speed
 
     def _look(self, exposures: dict[Light, float], attempt: int) -> tuple[View, ...]:
-        """Take both pictures; the laser burns no longer than it is used."""
+        """Let the arm settle under the ring light, and take both pictures.
+
+        The laser burns no longer than it is used.
+        """
+        station = self._station
         try:
-            return tuple(take_view(self._station, light, exposures[light], attempt)
-                         for light in LIGHTS)
+            arrived = time.monotonic()
+            station.lights.set("ring")
+            station.pause(station.document.robot.settle_s, since=arrived)
+            ring = take_view(station, "ring", exposures["ring"], attempt)
+            station.lights.set("laser")
+            return ring, take_view(station, "laser", exposures["laser"], attempt)
         finally:
-            self._station.lights.off()
+            station.lights.off()
 
     def _measure(self, observation: Observation, stop: PlannedStop) -> Outcome:
         papers = self._prepared.papers

@@ -54,14 +54,12 @@ class Driver:
         return self._drive([*self._way_out(), Waypoint("home", home)], arrived=None)
 
     def go_to(self, stand: Stand, via: Sequence[Joints] = ()) -> RobotState:
-        """Leave the present stand, enter the next by its approach, and let the arm settle."""
+        """Leave the present stand and enter the next by its approach."""
         between = [Waypoint(f"via {index + 1} of {stand.name}", joints)
                    for index, joints in enumerate(via)]
-        reached = self._drive([*self._way_out(), *between,
-                               Waypoint(f"approach of {stand.name}", stand.approach),
-                               Waypoint(stand.name, stand.joints, slow=True)], arrived=stand)
-        self._station.pause(self._station.document.robot.settle_s)
-        return reached
+        return self._drive([*self._way_out(), *between,
+                            Waypoint(f"approach of {stand.name}", stand.approach),
+                            Waypoint(stand.name, stand.joints, slow=True)], arrived=stand)
 
     def stand_at(self, stop: PlannedStop, base_from_flange: Transform) -> Stand | None:
         """Find the stand for a pose near the planned stop; None where it cannot be entered safely.

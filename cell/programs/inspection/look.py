@@ -1,4 +1,4 @@
-"""One look at a hole: light on, pose, exposure, pose, light off."""
+"""One view of a hole: pose, exposure, pose."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ TRIES = 3  # exposures for one view: the arm stands, so another costs only time
 
 
 def take_view(station: Station, light: Light, exposure: float, attempt: int) -> View:
-    """Expose once under `light` for `exposure` seconds, between two readings of the pose.
+    """Expose once for `exposure` seconds under `light`, which is on, between two readings of the
+    pose.
 
     A view during which the arm moved is taken again; if it goes on moving, the last view is
     returned as it is, and measuring refuses it.
@@ -29,7 +30,6 @@ def take_view(station: Station, light: Light, exposure: float, attempt: int) -> 
 
 
 def _expose(station: Station, light: Light, exposure: float, attempt: int) -> View:
-    station.lights.set(light)
     before = station.robot.state()
     moment = time.time()
     image = _snap(station, exposure)
