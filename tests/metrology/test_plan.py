@@ -1,4 +1,5 @@
 import dataclasses
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -126,7 +127,7 @@ def test_the_way_is_one_chain_from_home_to_home(papers):
     home = tuple(np.radians(papers.station.home_deg))
     legs = list(walk(planned(papers), home))
     assert legs[0].start == legs[-1].end == "home"
-    for leg, following in zip(legs, legs[1:], strict=False):
+    for leg, following in pairwise(legs):
         assert leg.end == following.start
         assert leg.joints[1] == following.joints[0]
     assert all(leg.slow for leg in legs if "approach" in leg.start and "approach" not in leg.end
@@ -140,7 +141,8 @@ def narrow(papers, joint, low, high):
 
 
 def test_what_cannot_be_is_refused_with_the_reason(papers):
-    far = [dataclasses.replace(hole, centre=hole.centre + [0, 900, 0]) for hole in papers.holes]
+    far = [dataclasses.replace(hole, centre=np.add(hole.centre, [0, 900, 0]))
+           for hole in papers.holes]
     assert "out of reach" in refusal(dataclasses.replace(papers, holes=tuple(far)))
     message = refusal(narrow(papers, 5, 162.0, 260.0))
     assert "joint 6 at" in message
@@ -188,7 +190,7 @@ def test_a_via_point_leads_round_an_obstacle(papers):
     post = Box(name="post", min=tuple(ahead - 10.0), max=tuple(ahead + 10.0))
     keep_out = (*papers.station.limits.keep_out, post)
     assert "'post'" in refusal(changed(papers, keep_out=keep_out, stops=tuple(ends)))
-    via = Via(joints_deg=tuple(np.degrees(middle) + [0, -30, 40, -10, 0, 0]))
+    via = Via(joints_deg=tuple(np.add(np.degrees(middle), [0, -30, 40, -10, 0, 0])))
     round_it = (ends[0], ends[1].model_copy(update={"via": (via,)}))
     way = planned(changed(papers, keep_out=keep_out, stops=round_it))
     assert way[1].via == (tuple(np.radians(via.joints_deg)),)
@@ -197,7 +199,7 @@ def test_a_via_point_leads_round_an_obstacle(papers):
 def test_a_taught_pose_that_does_not_see_its_hole_is_refused(papers):
     stops = list(papers.job.stops)
     taught = next(stop for stop in stops if stop.joints_deg)
-    turned = np.array(taught.joints_deg) + [4.0, 0, 0, 0, 0, 0]
+    turned = np.add(taught.joints_deg, [4.0, 0, 0, 0, 0, 0])
     stops[stops.index(taught)] = taught.model_copy(update={"joints_deg": tuple(turned)})
     assert "the hole would not lie in the image" in refusal(changed(papers, stops=tuple(stops)))
 
@@ -216,7 +218,7 @@ def test_what_would_not_be_seen_is_said(papers):
 
 
 def test_a_plan_with_refusals_still_has_its_other_stops(papers):
-    holes = [dataclasses.replace(hole, centre=hole.centre + [0, 900, 0]) if hole.id == "SI3"
+    holes = [dataclasses.replace(hole, centre=np.add(hole.centre, [0, 900, 0])) if hole.id == "SI3"
              else hole for hole in papers.holes]
     plan = draw_plan(papers.job, holes, papers.calibration, papers.station, ARM)
     assert len(plan.stops) == 23
