@@ -13,20 +13,18 @@ import numpy as np
 
 from cell.core.documents.station import RobotSettings
 from cell.core.errors import DeviceError
-from cell.core.geometry import Transform
 from cell.core.kinematics import JOINT_LIMIT, arm_for
 from cell.core.ports import Joints, Move, RobotIdentity, RobotState
+from cell.devices.ur.cycle import CycleReader, in_mm, is_still
 from cell.devices.ur.dashboard import Dashboard
 from cell.devices.ur.link import RefusedError, WorkerLink, WorkerLostError
 from cell.devices.ur.preflight import Controller, check_controller
 from cell.devices.ur.recovery import clear_stop
 from cell.devices.ur.states import state_of_bits, stopped
 
-MM_PER_M = 1000.0
 ANSWER_SECONDS = 3.0       # for a question
 REST_SECONDS = 1.5         # that braking may take
-STILL = 1e-3               # rad/s
-MODEL_MM, MODEL_DEG = 20.0, 2.0  # a calibrated arm is nearer to its published kinematics
+SLOWEST_JOINT = 2.0         # rad/s that every joint of every model reaches
 SPARE_FACTOR, SPARE_SECONDS = 1.5, 3.0  # of a move's deadline over its computed duration
 
 
@@ -45,7 +43,7 @@ class UrRobot:
         self._dashboard = Dashboard(address)
         self._link: WorkerLink | None = None
         self._stopped: DeviceError | None = DeviceError("not opened yet", device="robot")
-        self._flange_from_tcp = Transform.identity()
+        self._reader = CycleReader(self._arm, (0.0,) * 6)
         self._stopping = threading.Lock()
 
     @property
@@ -79,12 +77,12 @@ class UrRobot:
         cycle = self._ask("state", ANSWER_SECONDS)
         for move in path:
             cycle = self._go(move, cycle)
-            self._verify(move, self._read_state(cycle))
-        return self._read_state(cycle)
+            self._verify(move, self._read(cycle))
+        return self._read(cycle)
 
     def state(self) -> RobotState:
         """Read a cycle of the controller that came after the question."""
-        return self._read_state(self._ask("state", ANSWER_SECONDS))
+        return self._read(self._ask("state", ANSWER_SECONDS))
 
     def set_outputs(self, levels: dict[int, bool]) -> None:
         """Switch digital outputs and wait until they read back so."""
@@ -131,9 +129,9 @@ class UrRobot:
         self._link = self._started_link()
         self._stopped = None
         answer = self._ask("identity", ANSWER_SECONDS)
-        offset = tuple(_in_mm(answer["tcp_offset"]))
-        self._flange_from_tcp = Transform.from_parts(offset[3:], offset[:3])
-        self._read_state(answer)
+        offset = in_mm(answer["tcp_offset"])
+        self._reader = CycleReader(self._arm, offset)
+        self._read(answer)
         return RobotIdentity(found.model, found.serial, found.software, found.kinematics_checksum,
                              float(answer["payload_kg"]), offset)
 
@@ -143,7 +141,7 @@ class UrRobot:
         except DeviceError as error:
             with contextlib.suppress(DeviceError):
                 self._dashboard.ask("stop")  # its program may run by now, without a watchdog
-            raise DeviceError(f"the robot's client could not start: {error.message}",
+            raise DeviceError(f"the robot's client could not start: {_plain(error.message)}",
                               device="robot") from error
 
     def _drop_link(self) -> None:
@@ -154,8 +152,7 @@ class UrRobot:
     def _wait_for_rest(self, link: WorkerLink) -> None:
         deadline = time.monotonic() + REST_SECONDS
         while time.monotonic() < deadline:
-            cycle = link.ask("state", REST_SECONDS)
-            if max(map(abs, cycle["speeds"])) < STILL:
+            if is_still(link.ask("state", REST_SECONDS)):
                 return
 
     # --- asking -----------------------------------------------------------------------------------
@@ -165,6 +162,9 @@ class UrRobot:
             raise self._stopped or DeviceError("not connected", device="robot")
         try:
             return self._link.ask(deed, limit, **arguments)
+        except KeyboardInterrupt:
+            self.stop()
+            raise
         except WorkerLostError as error:
             raise self._give_up(stopped("lost", error.message)) from error
         except RefusedError as error:
@@ -210,26 +210,11 @@ class UrRobot:
                 f"did not arrive: {millimetres:.3f} mm and {math.degrees(radians):.3f} degrees off",
                 device="robot"))
 
-    # --- reading ----------------------------------------------------------------------------------
-
-    def _read_state(self, cycle: dict[str, Any]) -> RobotState:
-        pose = _in_mm(cycle["tcp_pose"])
-        base_from_tcp = Transform.from_parts(pose[3:], pose[:3])
-        state = RobotState(
-            base_from_flange=base_from_tcp @ self._flange_from_tcp.inverse,
-            joints=tuple(cycle["joints"]), controller_time=cycle["time"],
-            still=max(map(abs, cycle["speeds"])) < STILL,
-            temperatures=tuple(cycle["temperatures"]))
-        self._check_model(state)
-        return state
-
-    def _check_model(self, state: RobotState) -> None:
-        """Compare pose and joints: another model or another TCP would shift every measurement."""
-        millimetres, radians = self._arm.forward(state.joints).distance(state.base_from_flange)
-        if millimetres > MODEL_MM or math.degrees(radians) > MODEL_DEG:
-            raise self._give_up(DeviceError(
-                f"joints and pose do not belong to a {self._settings.model} ({millimetres:.1f} mm "
-                "apart): another model, or the TCP was changed", device="robot"))
+    def _read(self, cycle: dict[str, Any]) -> RobotState:
+        try:
+            return self._reader.read(cycle)
+        except DeviceError as error:
+            raise self._give_up(error) from error
 
 
 def _check_move(move: Move) -> None:
@@ -242,11 +227,15 @@ def _check_move(move: Move) -> None:
                           device="robot")
 
 
+def _plain(message: str) -> str:
+    """Add to the client's words what a technician can do."""
+    if "in use" not in message:
+        return message
+    return (f"{message} Another RTDE client or an enabled fieldbus (EtherNet/IP, PROFINET, MODBUS) "
+            "holds the controller's registers: disable it in the installation.")
+
+
 def _duration(move: Move, start: Joints) -> float:
     """Time a move from rest to rest at its leading joint's speed and acceleration."""
     turn = float(np.abs(np.subtract(move.joints, start)).max())
-    return turn / move.speed + move.speed / move.acceleration
-
-
-def _in_mm(pose: Sequence[float]) -> list[float]:
-    return [length * MM_PER_M for length in pose[:3]] + list(pose[3:])
+    return turn / min(move.speed, SLOWEST_JOINT) + move.speed / move.acceleration

@@ -32,6 +32,7 @@ DIE_WITH_PARENT = 1   # prctl's PR_SET_PDEATHSIG
 VARIABLES = ["timestamp", "actual_q", "actual_qd", "actual_TCP_pose", "robot_mode", "safety_mode",
              "safety_status_bits", "runtime_state", "joint_temperatures", "target_speed_fraction",
              "actual_digital_output_bits", "payload"]
+STANDARD_OUTPUTS = 8  # the configurable ones are counted on from there
 PLAYING = 2           # runtime_state
 MAY_MOVE = (1, 2)     # safety_mode: normal, reduced
 
@@ -118,7 +119,10 @@ class Worker:
         """Switch digital outputs and come back when the stream shows them so."""
         wanted = {int(output): level for output, level in levels.items()}
         for output, level in sorted(wanted.items(), key=lambda item: item[1]):  # off before on
-            self._io.setStandardDigitalOut(output, level)
+            if output < STANDARD_OUTPUTS:
+                self._io.setStandardDigitalOut(output, level)
+            else:
+                self._io.setConfigurableDigitalOut(output - STANDARD_OUTPUTS, level)
         deadline = time.monotonic() + READ_BACK
         while any(self._receive.getDigitalOutState(output) != level
                   for output, level in wanted.items()):
@@ -170,14 +174,16 @@ class Worker:
             self._kicked = now
 
     def _watch(self, parent: int) -> None:
-        stamp, since = -1.0, time.monotonic()
+        stamp, quiet, last = -1.0, 0.0, time.monotonic()
         while True:
             time.sleep(0.01)
             now, latest = time.monotonic(), self._receive.getTimestamp()
-            stamp, since = (latest, now) if latest != stamp else (stamp, since)
+            # A time in which this process itself did not run says nothing about the controller.
+            quiet = quiet + min(now - last, 0.02) if latest == stamp else 0.0
+            stamp, last = latest, now
             if not self._receive.isConnected():
                 os._exit(LOST)
-            if now - since > STALL:
+            if quiet > STALL:
                 os._exit(STALLED)
             if os.getppid() != parent:
                 os._exit(ORPHANED)

@@ -18,6 +18,8 @@ from cell.sim.controller.rtde import RtdeSession, Values, outputs_of
 
 PRIMARY, SCRIPT, RTDE, DASHBOARD = 30001, 30003, 30004, 29999
 UPLOAD_DELAY = 0.08  # s from the end of an upload to the running program
+OUTPUT_GROUPS = {"standard_digital_output": 0, "configurable_digital_output": 8,
+                 "tool_digital_output": 16}  # the first bit of each in the outputs' word
 IDLE_PERIOD = 0.05   # s between cycles while no client listens and nothing moves
 
 
@@ -39,7 +41,8 @@ class Server:
     def restart(self, controller: Controller) -> None:
         """Begin anew with a controller that knows nothing of what was before."""
         self.cut()
-        controller.wall = self._commanded = self._now
+        controller.wall = self._now
+        self._silence = 0.0
         self.controller = controller
         self.faults: set[str] = set()
         self.uploads = 0
@@ -127,11 +130,13 @@ class Server:
 
     def _cycle(self) -> None:
         controller = self.controller
+        # A time in which this process did not run, on a busy machine, is not the client's silence.
+        self._silence += min(self._now - controller.wall, 2.0 * self._period)
         controller.advance(self._now)
         self._start_uploaded()
         if self._program is not None:
             self._program.step()
-            if self._now - self._commanded > self._program.silence_allowed and controller.playing:
+            if self._silence > self._program.silence_allowed and controller.playing:
                 controller.end_program("the client's watchdog was not kicked")
             if controller.runtime is Runtime.STOPPED:
                 self._program = None
@@ -149,12 +154,13 @@ class Server:
 
     def _write(self, values: Values) -> None:
         self._registers.update(values)
-        if "standard_digital_output_mask" in values:
-            mask, levels = (int(values[f"standard_digital_output{part}"])  # type: ignore[arg-type]
-                            for part in ("_mask", ""))
-            self.controller.set_outputs(mask, levels)
+        for group, shift in OUTPUT_GROUPS.items():
+            if f"{group}_mask" in values:
+                mask, levels = (int(values[f"{group}{part}"]) << shift  # type: ignore[arg-type]
+                                for part in ("_mask", ""))
+                self.controller.set_outputs(mask, levels)
         if "input_int_register_0" in values:
-            self._commanded = self._now
+            self._silence = 0.0
             if self._program is not None:
                 self.controller.advance(self._now)
                 self._program.step()

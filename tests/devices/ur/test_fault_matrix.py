@@ -103,6 +103,7 @@ def test_a_client_process_that_is_killed_is_noticed_at_once(robot, lights, truth
     check_safe(truth, goal)
 
 
+@pytest.mark.soak
 def test_a_client_process_that_hangs_is_killed_at_the_deadline(robot, lights, truth):
     error, seconds, goal = interrupt_a_move(
         robot, lights, lambda: os.kill(robot.client_pid, signal.SIGSTOP))

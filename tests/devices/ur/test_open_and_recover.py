@@ -72,6 +72,7 @@ def test_a_robot_in_use_is_not_taken_over(robot, emulator, settings, truth):
     move_on(robot)
 
 
+@pytest.mark.soak
 def test_a_program_that_does_not_start_is_told_in_time(robot, emulator):
     emulator.tell_referee("refuse_upload on")
     begun = time.monotonic()
