@@ -40,6 +40,14 @@ class Workplace:
     def active_set(self) -> Path:
         return next((self.cell / "sets").iterdir())
 
+    @property
+    def documents(self) -> dict[str, Path]:
+        """All documents of the demo job, by name."""
+        return {"job": self.job, "nominals": self.nominals, "cell": self.cell / "cell.yaml",
+                "body": self.cell / "body" / "demo.yaml", "active": self.cell / "active.yaml",
+                "sensor": self.active_set / "sensor.yaml",
+                "hand_eye": self.active_set / "hand_eye.yaml"}
+
     def replace(self, file: Path, old: str, new: str) -> None:
         """Replace the first `old` in a file; it must be there."""
         text = file.read_text()

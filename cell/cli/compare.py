@@ -35,7 +35,8 @@ def compare(
     from cell.metrology.compare import compare_points
 
     comparison = compare_points(read_measured_points(read_text(measured), str(measured)),
-                                read_nominal_points(read_text(nominals), str(nominals)))
+                                read_nominal_points(read_text(nominals), str(nominals)),
+                                str(measured))
     if as_json:
         print_json(_describe(comparison))
     else:

@@ -56,22 +56,26 @@ class Comparison:
     missing: tuple[str, ...]
 
 
-def compare_points(measured: Sequence[Point], nominals: Sequence[Point]) -> Comparison:
+def compare_points(measured: Sequence[Point], nominals: Sequence[Point],
+                   source: str = "measured") -> Comparison:
     """Compare measured points with the nominals of the same id.
 
     Raises:
-        DocumentError: an id without nominal, no common axis at all, or tables in unlike units.
+        DocumentError: names `source`: an id without nominal, no common axis at all, or tables in
+            unlike units.
     """
     by_id = {point.id: point for point in nominals}
-    unknown = [point.id for point in measured if point.id not in by_id]
+    unknown = list(dict.fromkeys(point.id for point in measured if point.id not in by_id))
     if unknown:
-        raise DocumentError(f"measured but not among the nominals: {', '.join(unknown)}")
+        raise DocumentError(f"measured but not among the nominals: {', '.join(unknown)}",
+                            source=source)
     points = tuple(_deviations(point, by_id[point.id]) for point in measured)
     axes = {axis: _statistics(axis, points) for axis in AXES
             if any(axis in point.values for point in points)}
     if not axes:
-        raise DocumentError("no point has an axis that is both measured and controlled")
-    _check_units(measured, by_id)
+        raise DocumentError("no point has an axis that is both measured and controlled",
+                            source=source)
+    _check_units(measured, by_id, source)
     seen = {point.id for point in measured}
     return Comparison(points, axes, _repeatability(points),
                       tuple(point.id for point in nominals if point.id not in seen))
@@ -106,7 +110,7 @@ def _repeatability(points: Sequence[Deviations]) -> dict[str, tuple[int, dict[st
     return spreads
 
 
-def _check_units(measured: Sequence[Point], nominals: dict[str, Point]) -> None:
+def _check_units(measured: Sequence[Point], nominals: dict[str, Point], source: str) -> None:
     """Refuse one table in metres and the other in millimetres."""
     pairs = np.array([(value, nominals[point.id].values[axis]) for point in measured
                       for axis, value in point.values.items() if axis in nominals[point.id].values])
@@ -114,4 +118,4 @@ def _check_units(measured: Sequence[Point], nominals: dict[str, Point]) -> None:
     if sizes.min() < LIKE_METRES * sizes.max():
         small, large = ("measured", "nominal") if sizes[0] < sizes[1] else ("nominal", "measured")
         raise DocumentError(f"the {small} values are a thousandth of the {large} ones: metres "
-                            "beside millimetres; expected millimetres in both")
+                            "beside millimetres; expected millimetres in both", source=source)

@@ -31,7 +31,8 @@ def test_repeated_measurements_show_their_spread(cell, workplace):
 
 @pytest.mark.parametrize(("words", "said"), [
     (("jobs/paper/none.csv", "jobs/paper/table2_nominals.csv"), "none.csv: there is no such file"),
-    (("jobs/paper/table2_measured.csv", "jobs/paper/table1_nominals.csv"), "not among the nominals"),
+    (("jobs/paper/table2_measured.csv", "jobs/paper/table1_nominals.csv"),
+     "table2_measured.csv: measured but not among the nominals"),
     (("jobs/demo.yaml", "jobs/demo.csv"), "demo.yaml: line 1"),
 ])
 def test_what_cannot_be_compared_ends_with_2(cell, workplace, words, said):

@@ -168,8 +168,9 @@ def _unknown_hole(hole_id: str, papers: Papers) -> str:
     return f"the hole {hole_id!r} is not among the nominals ({few}{more})"
 
 
-def check_identity(record: RobotRecord, identity: RobotIdentity) -> None:
-    """Refuse a robot other than the one that the hand-eye was calibrated on.
+def check_identity(record: RobotRecord, identity: RobotIdentity,
+                   source: str = "hand_eye") -> None:
+    """Refuse a robot other than the one that the hand-eye of `source` was calibrated on.
 
     Raises:
         DocumentError: model, serial, kinematics checksum, TCP offset or payload differ.
@@ -187,4 +188,4 @@ def check_identity(record: RobotRecord, identity: RobotIdentity) -> None:
         if not same:
             raise DocumentError(f"calibrated on a robot with {name} {expected}; the controller "
                                 f"says {came}: activate the set of this robot, or calibrate",
-                                source="hand_eye", place=f"robot.{name}")
+                                source=source, place=f"robot.{name}")

@@ -28,7 +28,8 @@ class Prepared:
 
     def check_identity(self, identity: RobotIdentity) -> None:
         """Refuse a robot other than the one that the calibration set was made with."""
-        check_identity(self.papers.calibration.hand_eye.robot, identity)
+        check_identity(self.papers.calibration.hand_eye.robot, identity,
+                       self.papers.sources["hand_eye"])
 
 
 def prepare(job: Path, cell: str | None = None) -> Prepared:

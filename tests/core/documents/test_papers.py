@@ -1,7 +1,11 @@
 import dataclasses
+import re
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from made_workplace import Workplace
 
 from cell.core.documents.calibration import HandEyeDocument, SensorDocument
 from cell.core.documents.papers import Papers, check_identity
@@ -95,11 +99,17 @@ def test_a_matrix_that_is_no_rotation_is_refused(workplace, row, words):
         parse(HandEyeDocument, dump(spoilt), "hand_eye.yaml")
 
 
-RIGHT = RobotIdentity("ur10e", "20235500417", "5.17", "", 3.2, (0.0,) * 6)
+def identity_of(record, **other):
+    right = RobotIdentity(record.model, record.serial, "5.17", record.kinematics_checksum,
+                          record.payload_kg, record.tcp_offset)
+    return dataclasses.replace(right, **other)
 
 
 def test_the_robot_that_was_calibrated_is_accepted(workplace):
-    check_identity(workplace.papers().calibration.hand_eye.robot, RIGHT)
+    record = workplace.papers().calibration.hand_eye.robot
+    check_identity(record, identity_of(record))
+    unnamed = record.model_copy(update={"kinematics_checksum": ""})
+    check_identity(unnamed, identity_of(record, kinematics_checksum="a1"))
 
 
 @pytest.mark.parametrize(("field", "value", "words"), [
@@ -107,15 +117,31 @@ def test_the_robot_that_was_calibrated_is_accepted(workplace):
     ("serial", "20235500418", "robot.serial.*20235500417.*20235500418"),
     ("tcp_offset", (0.0, 0.0, 120.0, 0.0, 0.0, 0.0), "robot.tcp_offset.*120"),
     ("payload_kg", 1.0, "robot.payload_kg.*3.2.*1.0"),
+    ("kinematics_checksum", "b2", "robot.kinematics_checksum.*b2"),
 ])
 def test_another_robot_is_refused(workplace, field, value, words):
-    other = dataclasses.replace(RIGHT, **{field: value})
-    with pytest.raises(DocumentError, match=words):
-        check_identity(workplace.papers().calibration.hand_eye.robot, other)
-
-
-def test_another_kinematics_calibration_is_refused_where_one_was_recorded(workplace):
     record = workplace.papers().calibration.hand_eye.robot
-    named = record.model_copy(update={"kinematics_checksum": "a1"})
-    with pytest.raises(DocumentError, match="kinematics_checksum a1"):
-        check_identity(named, dataclasses.replace(RIGHT, kinematics_checksum="b2"))
+    with pytest.raises(DocumentError, match=f"sets/1/hand_eye.yaml: {words}"):
+        check_identity(record, identity_of(record, **{field: value}), "sets/1/hand_eye.yaml")
+
+
+SCRAP = st.sampled_from(["", "~", "[]", "{}", "-1", "1e999", ".nan", "[[1]]", "true", "x", "'", "{",
+                         "&a", "*a", "!!set {a}", "- ", "? x", "\t", "0", "1" * 5000, ": :", "é"])
+
+
+@pytest.fixture(scope="module")
+def right(tmp_path_factory):
+    return Workplace.in_folder(tmp_path_factory.mktemp("right")).papers()
+
+
+@given(st.data())
+@settings(max_examples=60)
+def test_no_scrap_in_any_document_leads_past_papers_or_a_refusal(right, data):
+    """One word of one document is replaced, wherever it stands."""
+    name = data.draw(st.sampled_from(sorted(right.texts)))
+    words = re.split(r"(\s+|,|:|\[|\])", right.texts[name])
+    words[data.draw(st.integers(0, len(words) - 1))] = data.draw(SCRAP)
+    try:
+        Papers.parse({**right.texts, name: "".join(words)}, right.set_id)
+    except DocumentError as refused:
+        assert refused.source in right.texts
