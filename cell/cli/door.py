@@ -11,6 +11,7 @@ from rich.markup import escape
 
 from cell import __version__
 from cell.cli.audit import audit
+from cell.cli.calibrate import calibrate
 from cell.cli.check import check
 from cell.cli.compare import compare
 from cell.cli.error_model import error_model
@@ -37,6 +38,7 @@ WRONG_WORDS: Any = typer.BadParameter.__mro__[2]  # the base of usage errors, wh
 REASONS = {2: "bad_input", 3: "device_fault", 4: "recording_failed"}
 
 app.command()(run)
+app.add_typer(calibrate)
 app.command()(report)
 app.command()(locate)
 app.command()(error_model)

@@ -1,0 +1,122 @@
+"""`cell calibrate`: camera, light plane, hand-eye, body; sets and their history."""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+from rich.table import Table
+
+from cell.cli.words import answers, console, print_json
+
+if TYPE_CHECKING:
+    from cell.metrology.hand_eye_calibration import HandEyeAnswer
+
+ACCEPTED, REFUSED = 0, 1
+STYLE = {"pass": "green", "solved": "green", "warn": "yellow", "refuse": "red"}
+
+calibrate = typer.Typer(
+    name="calibrate", no_args_is_help=True, rich_markup_mode="markdown",
+    help="Calibrate the camera, the light plane, the hand-eye transform and the body registration.")
+
+
+class Gates(StrEnum):
+    """Which gates judge."""
+
+    fine = "fine"
+    coarse = "coarse"
+
+
+class Mount(StrEnum):
+    """Where the camera sits."""
+
+    flange = "flange"
+    static = "static"
+
+
+@calibrate.command("hand-eye")
+def hand_eye(
+    recorded: Path | None = typer.Option(None, "--from", metavar="FOLDER",
+                                         help="Solve a recorded session instead of moving."),
+    gates: Gates = typer.Option(Gates.fine, help="Judge as a fine cell (0.5 mm tolerances) or as a "
+                                                 "coarse one (large robots and distances)."),
+    mount: Mount | None = typer.Option(None, help="Where the camera sits, if the folder does not "
+                                                  "say: on the flange, or static."),
+    as_json: bool = typer.Option(False, "--json", help="Print one JSON object."),
+) -> None:
+    """Find where the camera sits on the flange (or in the base, for a static camera).
+
+    A recorded session is a folder with base_from_flange.csv, views.npz and camera.yaml, or with
+    camera_from_board.csv for poses alone. It is diagnosed before it is solved: units, conventions,
+    exchanged lists, a moved board, doubtful intrinsics are named, never corrected.
+
+    Exit code: 0 accepted, 1 refused (with reasons), 2 bad input.
+    """
+    if recorded is None:
+        raise typer.BadParameter("say --from FOLDER")
+    from cell.metrology.hand_eye_calibration import calibrate_hand_eye
+    from cell.programs.calibration.recorded import read_gates, read_recorded
+
+    read = read_recorded(recorded, None if mount is None else mount.value)
+    answer = calibrate_hand_eye(read.session, read_gates().level(gates.value))
+    if as_json:
+        print_json(_answer_as_json(answer, read.notes))
+    else:
+        _show_answer(answer, read.notes)
+    raise typer.Exit(REFUSED if answer.verdict == "refuse" else ACCEPTED)
+
+
+def _answer_as_json(answer: HandEyeAnswer, notes: tuple[str, ...]) -> dict[str, Any]:
+    figures = {name: _number(value) for name, value in answer.figures.items()}
+    return {"verdict": answer.verdict, "reasons": list(answer.reasons), "notes": list(notes),
+            **_solution_as_json(answer),
+            "object_rms_mm": figures.get("object_rms_mm"),
+            "holdout_rms_mm": figures.get("holdout_rms_mm"),
+            "point_sigma_mm": figures.get("point_sigma_mm"),
+            "working_distance_mm": figures.get("working_distance_mm"),
+            "limited_by": answer.limited_by,
+            "views": {"used": list(answer.used), "apart": list(answer.apart),
+                      "left_out": list(answer.left_out)},
+            "findings": [vars(finding) for finding in answer.findings],
+            "gates": [{**vars(gate), "value": _number(gate.value)} for gate in answer.gates],
+            "figures": figures}
+
+
+def _solution_as_json(answer: HandEyeAnswer) -> dict[str, Any]:
+    """Name the unknown by the mount; all null where nothing could be solved."""
+    if answer.held_out is None:
+        return {answer.unknown: None, "covariance": None}
+    result = answer.held_out.result
+    return {answer.unknown: result.carrier_from_camera.matrix,
+            "covariance": result.covariance[:6, :6],
+            answer.board: result.reference_from_board.matrix}
+
+
+def _show_answer(answer: HandEyeAnswer, notes: tuple[str, ...]) -> None:
+    for note in notes:
+        console.print(f"[yellow]note:[/yellow] {note}", highlight=False)
+    if answer.gates:
+        answers.print(_gates_table(answer))
+    if answer.held_out is not None:
+        answers.print(f"{answer.unknown} (mm)", highlight=False)
+        answers.print(answer.held_out.result.carrier_from_camera.matrix.round(5))
+    for reason in answer.reasons:
+        answers.print(f"- {reason}", highlight=False)
+    if answer.limited_by:
+        answers.print(answer.limited_by, highlight=False)
+    answers.print(f"[{STYLE[answer.verdict]}]{answer.verdict}[/]", highlight=False)
+
+
+def _gates_table(answer: HandEyeAnswer) -> Table:
+    table = Table("figure", "value", "limit", "verdict", box=None, pad_edge=False)
+    for gate in answer.gates:
+        table.add_row(gate.meaning, f"{gate.value:.4g}", gate.limit,
+                      f"[{STYLE[gate.verdict]}]{gate.verdict}[/]")
+    return table
+
+
+def _number(value: float) -> float | None:
+    return None if math.isnan(value) else float(value)

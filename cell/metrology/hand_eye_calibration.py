@@ -1,0 +1,138 @@
+"""Hand-eye as a whole: diagnose, solve, hold out, judge. One session in, one answer out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Literal, TypeAlias
+
+from cell.metrology.calibration_gates import Checked, GateSet, check_gates, worst
+from cell.metrology.diagnosis import Finding, diagnose, moved_views, ruled_worst
+from cell.metrology.diagnosis_fit import (
+    check_camera,
+    judge_board,
+    judge_camera,
+    judge_scale,
+    judge_views,
+)
+from cell.metrology.explanations import estimate_board_scale
+from cell.metrology.hand_eye import HandEyeProblem, Mount, solve_hand_eye
+from cell.metrology.hand_eye_check import HeldOut, solve_and_hold_out
+from cell.metrology.hand_eye_figures import fit_figures, input_figures, what_limits
+from cell.metrology.hand_eye_session import HandEyeSession
+
+Answer: TypeAlias = Literal["pass", "refuse", "solved"]
+
+ENOUGH_VIEWS = 12  # below it a solution is a preview that cannot be activated
+
+
+@dataclass(frozen=True, eq=False)
+class HandEyeAnswer:
+    """The verdict on a session. `held_out` is None where nothing could be solved.
+
+    `numbers` are the session's numbers of the views that were kept, in the order of the problem
+    that `held_out` speaks of; `apart` and `left_out` are numbers too. `figures` are what the gates
+    looked at; `limited_by` says what limits the result.
+    """
+
+    verdict: Answer
+    mount: Mount
+    findings: tuple[Finding, ...]
+    gates: tuple[Checked, ...] = ()
+    held_out: HeldOut | None = None
+    figures: Mapping[str, float] = field(default_factory=dict)
+    kept: HandEyeProblem | None = None
+    numbers: tuple[int, ...] = ()
+    left_out: tuple[int, ...] = ()
+    limited_by: str = ""
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """What was found: what refuses before what warns, causes before figures."""
+        said = [*((finding.verdict, finding.sentence) for finding in self.findings),
+                *((gate.verdict, str(gate)) for gate in self.gates)]
+        return tuple(sentence for wanted in ("refuse", "warn")
+                     for verdict, sentence in said if verdict == wanted)
+
+    @property
+    def used(self) -> tuple[int, ...]:
+        """The views that were fitted."""
+        unused = {*self.apart, *self.left_out}
+        return tuple(number for number in self.numbers if number not in unused)
+
+    @property
+    def unknown(self) -> str:
+        """The name of what is solved, which the mount decides."""
+        return "flange_from_camera" if self.mount == "flange" else "base_from_camera"
+
+    @property
+    def board(self) -> str:
+        """The name of the board's pose, which comes out as well."""
+        return "base_from_board" if self.mount == "flange" else "flange_from_board"
+
+    @property
+    def apart(self) -> tuple[int, ...]:
+        """The views that were kept out of the fit."""
+        return () if self.held_out is None else tuple(self.numbers[i] for i in self.held_out.apart)
+
+
+def calibrate_hand_eye(session: HandEyeSession, gates: GateSet) -> HandEyeAnswer:
+    """Diagnose a session, solve it where that has a meaning, and judge the solution by the gates.
+
+    Board poses without corners are solved and not judged: nothing says what they are worth.
+    """
+    moved = moved_views(session)
+    standing = session.without(moved)
+    findings = [*diagnose(standing),
+                *(Finding("robot_moved", "warn", sentence) for sentence in moved.values())]
+    left_out = _numbers(session, moved)
+    if ruled_worst(findings) == "refuse":
+        return HandEyeAnswer("refuse", session.mount, tuple(findings), left_out=left_out)
+    problem = standing.problem(gates.robot.noise)
+    whole = solve_hand_eye(problem)
+    kept = standing.without(whole.dropped)
+    answer = _judged(kept, gates) if session.views else _solved(kept, gates)
+    about = [*(judge_board(standing, problem, whole) if session.views else []),
+             *judge_views(standing, problem, whole), *findings]
+    return _with(answer, about, left_out + _numbers(standing, whole.dropped))
+
+
+def _solved(session: HandEyeSession, gates: GateSet) -> HandEyeAnswer:
+    problem = session.problem(gates.robot.noise)
+    held_out = solve_and_hold_out(problem)
+    return HandEyeAnswer("solved", session.mount, (), (), held_out,
+                         fit_figures(session, problem, held_out), problem, session.numbers)
+
+
+def _judged(session: HandEyeSession, gates: GateSet) -> HandEyeAnswer:
+    problem = session.problem(gates.robot.noise)
+    held_out = solve_and_hold_out(problem)
+    scale = estimate_board_scale(problem, solve_hand_eye(problem))
+    camera = check_camera(session)
+    figures = {**input_figures(session, camera, scale), **fit_figures(session, problem, held_out)}
+    limits = gates.hand_eye
+    found = [*judge_camera(camera, limits["split_half_percent"]), *_preview(session),
+             *judge_scale(scale, limits["board_scale_percent"])]
+    return HandEyeAnswer("pass", session.mount, tuple(found), check_gates(figures, limits),
+                         held_out, figures, problem, session.numbers,
+                         limited_by=what_limits(figures, camera, limits))
+
+
+def _with(answer: HandEyeAnswer, about: list[Finding], left_out: tuple[int, ...]) -> HandEyeAnswer:
+    """Add what was found of the input, and draw the verdict from everything together."""
+    findings = (*answer.findings, *about)
+    ruling = worst([*(finding.verdict for finding in findings),
+                    *(gate.verdict for gate in answer.gates)])
+    verdict = "refuse" if ruling == "refuse" else answer.verdict
+    return replace(answer, verdict=verdict, findings=findings, left_out=left_out)
+
+
+def _preview(session: HandEyeSession) -> list[Finding]:
+    if len(session) >= ENOUGH_VIEWS:
+        return []
+    return [Finding("preview", "refuse", f"{len(session)} views: a preview, which cannot be "
+                    f"activated; {ENOUGH_VIEWS} are wanted")]
+
+
+def _numbers(session: HandEyeSession, indices: Iterable[int]) -> tuple[int, ...]:
+    return tuple(session.numbers[index] for index in indices)

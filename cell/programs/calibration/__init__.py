@@ -1,0 +1,1 @@
+"""The wizard: camera, light plane, hand-eye and body registration, ending in one set."""

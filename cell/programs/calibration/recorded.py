@@ -1,0 +1,183 @@
+"""A recorded hand-eye session in a folder: robot poses, corners or board poses, the camera.
+
+    base_from_flange.csv     view, m00..m33: the controller's flange pose, mm
+    views.npz                object_mm (view, corner, 3), image_px (view, corner, 2), padded by NaN
+    camera.yaml              image_size, camera_matrix, distortion [k1, k2, p1, p2, k3]
+    camera_from_board.csv    instead of the two: board poses alone
+    expected.yaml            may hold camera_mount: flange or static
+"""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+
+from cell.archive.files import read_text
+from cell.core.documents.base import Document, Matrix3, Number
+from cell.core.documents.table import Row, read_table
+from cell.core.documents.text import parse, read_tree
+from cell.core.errors import DocumentError, UnmeasurableError
+from cell.core.geometry import Array
+from cell.core.optics import CameraModel
+from cell.metrology.board_pose import FEWEST_CORNERS, BoardView
+from cell.metrology.calibration_gates import GateBook
+from cell.metrology.diagnosis import as_given
+from cell.metrology.hand_eye import Mount
+from cell.metrology.hand_eye_session import HandEyeSession
+from cell.metrology.motions import nearest_rotation
+from cell.metrology.readings import fit_reading
+
+ROUNDED = 1e-3  # of R Rᵀ = 1: digits lost in print; beyond it the matrix is no rotation
+FLAT = 1e-3     # mm
+COLUMNS = ("view", *(f"m{row}{column}" for row in range(4) for column in range(4)))
+
+
+class CameraDocument(Document):
+    """`camera.yaml` of a session."""
+
+    image_size: tuple[int, int]
+    camera_matrix: Matrix3
+    distortion: tuple[Number, Number, Number, Number, Number]
+
+    @property
+    def model(self) -> CameraModel:
+        """The camera as mathematics uses it."""
+        return CameraModel(self.image_size, np.array(self.camera_matrix), np.array(self.distortion))
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """A session as read, and what had to be assumed or left out to read it."""
+
+    session: HandEyeSession
+    notes: tuple[str, ...]
+
+
+def read_gates() -> GateBook:
+    """Read the gates that come with the package."""
+    file = resources.files("cell.metrology") / "calibration_gates.yaml"
+    return parse(GateBook, file.read_text("utf-8"), file.name)
+
+
+def read_recorded(folder: Path, mount: Mount | None = None) -> Recorded:
+    """Read a session; where nobody says how the camera is mounted, the data do.
+
+    Raises:
+        DocumentError: a file is absent or wrong, or no view carries a board.
+    """
+    if not folder.is_dir():
+        raise DocumentError("there is no such folder", source=str(folder))
+    stated = mount or _stated_mount(folder)
+    session, notes = _read(folder, stated or "flange")
+    if stated:
+        return Recorded(session, notes)
+    chosen, note = _choose_mount(folder, session)
+    return Recorded(chosen, (*notes, note))
+
+
+def _read(folder: Path, mount: Mount) -> tuple[HandEyeSession, tuple[str, ...]]:
+    numbers, robot = _read_poses(folder / "base_from_flange.csv")
+    if (folder / "views.npz").exists() or not (folder / "camera_from_board.csv").exists():
+        return _read_views(folder, numbers, robot, mount)
+    _, boards = _read_poses(folder / "camera_from_board.csv")
+    _same_length(folder, robot, boards)
+    return HandEyeSession.of_poses(robot, boards, mount).numbered(numbers), ()
+
+
+def _read_views(folder: Path, numbers: tuple[int, ...], robot: Array,
+                mount: Mount) -> tuple[HandEyeSession, tuple[str, ...]]:
+    camera_file = folder / "camera.yaml"
+    camera = parse(CameraDocument, read_text(camera_file), str(camera_file)).model
+    views = _read_corners(folder / "views.npz")
+    _same_length(folder, robot, views)
+    keep = [index for index, view in enumerate(views) if len(view.pixels) >= FEWEST_CORNERS]
+    notes = tuple(f"view {numbers[index]} has {len(view.pixels)} corners: it was left out"
+                  for index, view in enumerate(views) if index not in keep)
+    if not keep:
+        raise DocumentError(f"no view has {FEWEST_CORNERS} corners", source=str(folder))
+    try:
+        session = HandEyeSession.seen(robot[keep], tuple(views[index] for index in keep), camera,
+                                      mount)
+    except UnmeasurableError as error:
+        raise DocumentError(f"a view carries no board pose: {error.detail}",
+                            source=str(folder / "views.npz")) from None
+    return session.numbered(tuple(numbers[index] for index in keep)), notes
+
+
+def _read_poses(file: Path) -> tuple[tuple[int, ...], Array]:
+    rows = read_table(read_text(file), str(file), COLUMNS)
+    if not rows:
+        raise DocumentError("no view", source=str(file))
+    poses = np.array([_pose(row) for row in rows])
+    named = tuple(int(row.cells["view"]) for row in rows if row.cells["view"].isdecimal())
+    return named if len(set(named)) == len(rows) else tuple(range(len(rows))), poses
+
+
+def _pose(row: Row) -> Array:
+    matrix = np.array([row.number(column) for column in COLUMNS[1:]]).reshape(4, 4)
+    turn = matrix[:3, :3]
+    if not np.allclose(matrix[3], [0.0, 0.0, 0.0, 1.0], atol=1e-9):
+        raise row.refuse("the last row of a pose is 0 0 0 1 (is the matrix written column by "
+                         "column?)")
+    if np.abs(turn @ turn.T - np.eye(3)).max() > ROUNDED or np.linalg.det(turn) < 0:
+        raise row.refuse("the upper left 3x3 of a pose is a rotation: orthogonal unit rows, "
+                         "determinant +1")
+    matrix[:3, :3] = nearest_rotation(turn)
+    matrix[3] = [0.0, 0.0, 0.0, 1.0]
+    return matrix
+
+
+def _read_corners(file: Path) -> list[BoardView]:
+    try:
+        with np.load(file, allow_pickle=False) as archive:
+            points, pixels = (np.asarray(archive[name], dtype=np.float64)
+                              for name in ("object_mm", "image_px"))
+    except FileNotFoundError:
+        raise DocumentError("there is no such file", source=str(file)) from None
+    except KeyError:
+        raise DocumentError("expected the arrays object_mm and image_px", source=str(file)) from None
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise DocumentError(f"not a readable .npz of numbers: {error}", source=str(file)) from None
+    if points.ndim != 3 or points.shape[2] != 3 or pixels.shape != (*points.shape[:2], 2):
+        raise DocumentError("expected object_mm (view, corner, 3) and image_px (view, corner, 2); "
+                            f"came {points.shape} and {pixels.shape}", source=str(file))
+    seen = np.isfinite(points).all(axis=2) & np.isfinite(pixels).all(axis=2)
+    if np.abs(points[seen][:, 2]).max(initial=0.0) > FLAT:
+        raise DocumentError("object_mm: expected a flat board with z = 0", source=str(file))
+    return [BoardView(point[ok], pixel[ok])
+            for point, pixel, ok in zip(points, pixels, seen, strict=True)]
+
+
+def _stated_mount(folder: Path) -> Mount | None:
+    file = folder / "expected.yaml"
+    if not file.exists():
+        return None
+    tree, _ = read_tree(read_text(file), str(file))
+    stated = tree.get("camera_mount") if isinstance(tree, dict) else None
+    if stated in ("flange", "static"):
+        return stated
+    if stated is None:
+        return None
+    raise DocumentError(f"camera_mount: expected flange or static; came {stated!r}",
+                        source=str(file))
+
+
+def _choose_mount(folder: Path, session: HandEyeSession) -> tuple[HandEyeSession, str]:
+    """Let the data say how the camera is mounted: the mount under which the board stands still."""
+    mounts: tuple[Mount, Mount] = ("flange", "static")
+    fits = {mount: fit_reading(as_given(session.mounted(mount))) for mount in mounts}
+    best, other = sorted(mounts, key=lambda mount: fits[mount].miss)
+    return session.mounted(best), (
+        f"nothing in {folder.name} says how the camera is mounted: taken as {best}, where the board "
+        f"stands still to {fits[best].miss:.3g} mm (as {other}: {fits[other].miss:.3g} mm). Poses "
+        "given the other way round would look the same: say --mount if it is known")
+
+
+def _same_length(folder: Path, robot: Array, others: Array | list[BoardView]) -> None:
+    if len(robot) != len(others):
+        raise DocumentError(f"{len(robot)} robot poses but {len(others)} views: row i of the one "
+                            "belongs to row i of the other", source=str(folder))
