@@ -62,5 +62,5 @@ class Stripe:
     side: Array
     sigma: float
     correlation: float
-    bias: float = 0.05
+    bias: float = 0.03
     quality: dict[str, float] = field(default_factory=dict)

@@ -33,7 +33,8 @@ Budget: TypeAlias = dict[str, Array]
 """Covariances (4, 4) of x, y, z and the radius by source, mm²; sources are independent."""
 
 FORM_SIGMA = 0.004  # mm, each wave of the rim: what punched and drilled holes show
-EDGE_DOUBT = 0.02  # px: centres move by so much with the light, on any rim
+CLEAN = 0.3  # px of ambiguity that any rim shows
+CENTRE_DOUBT, RADIUS_DOUBT = 0.03, 0.07  # px: what the light does to the edge of a clean rim
 SHOWN = [0, 1, 2, RADIUS]
 
 
@@ -95,11 +96,13 @@ def two_step_budget(located: Array, solution: Solution, normal_sigma: float, amb
 
 
 def _edge_ambiguity(solution: Solution, ambiguity: float) -> Array:
-    """Let the seen edge lie off by a constant and, to one side, by half as much (uniformly)."""
+    """Let the seen edge lie beside the bore's all round, and more so on one side."""
     rim = solution.seen[0]
     toward = rim.rows.toward
-    constant, one_sided = ambiguity / np.sqrt(3.0), ambiguity / np.sqrt(12.0)
-    sigma = np.hypot([constant, one_sided, one_sided], EDGE_DOUBT)
+    beside = max(0.0, ambiguity - CLEAN)
+    constant = np.hypot(beside / np.sqrt(3.0), RADIUS_DOUBT)
+    one_sided = np.hypot(beside / np.sqrt(3.0), CENTRE_DOUBT)
+    sigma = np.array([constant, one_sided, one_sided])
     causes = np.column_stack([np.ones(len(toward)), toward]) * sigma
     return _spread(solution.response(rim, causes), np.eye(3))
 
