@@ -62,7 +62,7 @@ def run_job(request: Request, watch: Watch) -> Finished:
         prepared.check_identity(station.identity)
         start = begin(prepared, station, body_id, log.stem)
         inspection = BodyInspection(station, prepared, start, Recorder(log, start), watch)
-        status = _measure(inspection)
+        status = measure(inspection)
         if request.truth is not None and station.world is not None:
             _write_truth(request.truth, station, body_id)
     report = write_report(log, start, inspection)
@@ -83,7 +83,7 @@ def write_report(log: Path, start: Start, inspection: BodyInspection) -> Path:
     return write_page(page, log.with_suffix(".html"))
 
 
-def _measure(inspection: BodyInspection) -> Literal["complete", "interrupted"]:
+def measure(inspection: BodyInspection) -> Literal["complete", "interrupted"]:
     """Measure all holes and close the recording, whatever happens on the way."""
     try:
         inspection.measure_remaining()

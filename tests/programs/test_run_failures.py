@@ -1,0 +1,133 @@
+"""What `cell run` does when something is wrong: one clear message, the right code, nothing lost."""
+
+import json
+import resource
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from cell.core.errors import DeviceError
+from cell.programs.inspection import BodyInspection, prepare
+from cell.programs.run import Request, begin, measure, run_job
+from cell.programs.station import open_station
+from cell.recording import Recorder, read
+from cell.sim.controller.process import EmulatedController
+
+HOME_DEG = [137.939, -109.974, 123.23, 1.512, 47.073, 157.747]
+
+
+@pytest.fixture
+def plant(cell_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder of its own, to spoil."""
+    for name in ("jobs", "calibration"):
+        shutil.copytree(cell_folder / name, tmp_path / name)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def cell_run(folder: Path, *words: str, most_bytes: int | None = None
+             ) -> subprocess.CompletedProcess[str]:
+    def limit() -> None:
+        if most_bytes is not None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, most_bytes))
+
+    return subprocess.run([sys.executable, "-m", "cell", "run", "jobs/demo.yaml", "--json", *words],
+                          cwd=folder, text=True, capture_output=True, timeout=150, check=False,
+                          preexec_fn=limit)
+
+
+def change(file: Path, old: str, new: str) -> None:
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new))
+
+
+def refusal(done: subprocess.CompletedProcess[str], code: int) -> str:
+    assert done.returncode == code, done.stderr
+    answer = json.loads(done.stdout)
+    assert answer["ok"] is False
+    assert "Traceback" not in done.stderr
+    return answer["detail"]
+
+
+def test_logs_that_is_a_file_is_refused_before_anything_moves(plant: Path) -> None:
+    (plant / "logs").write_text("not a folder")
+    assert "logs" in refusal(cell_run(plant), 2)
+
+
+def test_options_of_simulated_cells_are_refused_for_real_ones(plant: Path) -> None:
+    change(plant / "calibration/demo/cell.yaml", "driver: sim\n  model: ur10e",
+           "driver: ur\n  address: 127.3.2.1\n  model: ur10e")
+    assert "--speed" in refusal(cell_run(plant, "--speed", "2"), 2)
+
+
+def test_no_robot_at_the_address_is_a_device_fault(plant: Path) -> None:
+    change(plant / "calibration/demo/cell.yaml", "driver: sim\n  model: ur10e",
+           "driver: ur\n  address: 127.3.2.1\n  model: ur10e")
+    assert "127.3.2.1" in refusal(cell_run(plant), 3)
+    assert not list((plant / "logs").glob("*.rrd"))
+
+
+def test_a_robot_in_local_mode_is_a_device_fault_that_says_what_to_do(plant: Path) -> None:
+    with EmulatedController("ur10e") as controller:
+        controller.tell_referee("local_mode on")
+        change(plant / "calibration/demo/cell.yaml", "driver: sim\n  model: ur10e",
+               f"driver: ur\n  address: {controller.address}\n  model: ur10e")
+        assert "remote" in refusal(cell_run(plant), 3).lower()
+
+
+def test_a_calibration_of_another_robot_is_refused_before_anything_moves(plant: Path) -> None:
+    hand_eye = next((plant / "calibration/demo/sets").glob("*/hand_eye.yaml"))
+    for manifest in hand_eye.parent.glob("set.yaml"):
+        manifest.unlink()
+    change(plant / "calibration/demo/cell.yaml", '  serial: "20235500417"\n', "")
+    hand_eye.chmod(0o644)
+    change(hand_eye, '"20235500417"', '"20199999999"')
+    assert "20199999999" in refusal(cell_run(plant), 2)
+    assert not list((plant / "logs").glob("*.rrd"))
+
+
+def test_a_disk_that_fills_during_the_run_ends_with_4_and_keeps_the_whole_holes(plant: Path) -> None:
+    done = cell_run(plant, "--speed", "10", most_bytes=3_000_000)
+    refusal(done, 4)
+    (log,) = (plant / "logs").glob("*.rrd")
+    assert 1 <= len(read(log).holes) < 24
+
+
+@pytest.mark.parametrize(("fault", "words"), [("wrong_size", "768 x 576"), ("lost", "camera")])
+def test_a_camera_that_fails_stops_the_run_and_the_recording_says_so(
+        plant: Path, fault: str, words: str) -> None:
+    prepared, log = prepare(Path("jobs/demo.yaml")), plant / "body.rrd"
+    with open_station(prepared.papers.station, prepared.folder, speed=10.0) as station:
+        start = begin(prepared, station, "body", log.stem)
+        inspection = BodyInspection(station, prepared, start, Recorder(log, start),
+                                    lambda *_: None)
+        station.world.set_fault(fault)
+        with pytest.raises(DeviceError, match=words):
+            measure(inspection)
+    assert read(log).status == "fault"
+
+
+def test_a_protective_stop_ends_the_run_with_the_arm_at_rest_and_the_laser_off(
+        plant: Path) -> None:
+    with EmulatedController("ur10e", speed=5.0,
+                            joints=[q * 3.141592653589793 / 180 for q in HOME_DEG]) as controller:
+        change(plant / "calibration/demo/cell.yaml", "driver: sim\n  model: ur10e",
+               f"driver: ur\n  address: {controller.address}\n  model: ur10e")
+
+        def watch(done: int, _total: int, _words: str) -> None:
+            if done == 2:
+                controller.tell_referee("protective_stop")
+
+        with pytest.raises(DeviceError, match="protective"):
+            run_job(Request(Path("jobs/demo.yaml")), watch)
+        truth = json.loads(controller.tell_referee("truth"))
+    assert truth["outputs"] == 0
+    assert max(map(abs, truth["joint_speeds"])) < 1e-3
+    (log,) = (plant / "logs").glob("*.rrd")
+    assert read(log).status == "fault"
+
+
