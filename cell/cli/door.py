@@ -10,6 +10,7 @@ import typer
 from rich.markup import escape
 
 from cell import __version__
+from cell.cli.approve import approve
 from cell.cli.audit import audit
 from cell.cli.calibrate import calibrate
 from cell.cli.check import check
@@ -18,6 +19,7 @@ from cell.cli.error_model import error_model
 from cell.cli.locate import locate
 from cell.cli.repair import repair
 from cell.cli.report import report
+from cell.cli.results import results_app
 from cell.cli.run import run
 from cell.cli.seal_key import seal_key_app
 from cell.cli.sim import sim
@@ -43,6 +45,8 @@ app.command()(report)
 app.command()(locate)
 app.command()(error_model)
 app.add_typer(study_app)
+app.command()(approve)
+app.add_typer(results_app)
 app.command()(audit)
 app.command()(repair)
 app.add_typer(seal_key_app)

@@ -21,7 +21,7 @@ CALIBRATION_PAPERS = ("sensor", "hand_eye", "body", "kinematics", "offsets")
 @dataclass(frozen=True, eq=False)
 class Booking:
     """One recording, as it is booked. `seal` is the head of its chain, `log` its file's name;
-    `stop` is None where the run died.
+    `stop` is None where the run died; `left` is then what can be said of the holes it left.
     """
 
     start: Start
@@ -30,6 +30,12 @@ class Booking:
     cell: str
     log: str
     seal: str
+    left: BodyResult | None = None
+
+    @property
+    def result(self) -> BodyResult | None:
+        """The judgement of the body."""
+        return self.stop.result if self.stop else self.left
 
 
 def calibration_hash(start: Start) -> str:
@@ -55,7 +61,7 @@ class BodyRows:
 
 def body_rows(booking: Booking) -> BodyRows:
     """Turn a recording into its rows."""
-    judged = _features(booking)
+    judged = booking.result.features if booking.result else ()
     return BodyRows(_body_row(booking),
                     [_feature_row(position, one) for position, one in enumerate(judged)],
                     [row for one in judged for row in _axis_rows(one)])
@@ -80,14 +86,8 @@ def _book_calibration(connection: Connection, body: Row) -> None:
             first_used=body["started"]))
 
 
-def _features(booking: Booking) -> tuple[Feature, ...]:
-    result = booking.stop.result if booking.stop else None
-    return result.features if result else ()
-
-
 def _body_row(booking: Booking) -> Row:
-    start, stop = booking.start, booking.stop
-    result = stop.result if stop else None
+    start, stop, result = booking.start, booking.stop, booking.result
     return {
         "recording_id": start.recording_id, "body_id": start.body_id, "job": booking.job,
         "cell": booking.cell, "set_id": start.set_id, "calibration": calibration_hash(start),

@@ -1,0 +1,171 @@
+"""`cell results`: list, show, export and rebuild the results database."""
+
+from __future__ import annotations
+
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from cell.cli.words import answers, console, print_json
+from cell.core.errors import OUT_OF_TOLERANCE, DocumentError
+
+if TYPE_CHECKING:
+    from cell.results.query import Filter
+
+results_app = typer.Typer(
+    name="results", no_args_is_help=True,
+    help="The results of all bodies: list, show, follow a trend, export CSV, rebuild.")
+
+LOGS = typer.Option(Path("logs"), "--logs", help="The folder of recordings and of the database.")
+URL = typer.Option(None, "--database", help="A plant's database, postgresql+psycopg://host/name.")
+SINCE = typer.Option(None, "--since", formats=["%Y-%m-%d", "%Y-%m-%dT%H:%M"], help="From, in UTC.")
+UNTIL = typer.Option(None, "--until", formats=["%Y-%m-%d", "%Y-%m-%dT%H:%M"], help="Up to, in UTC.")
+JOB = typer.Option("", "--job", help="Only this job's bodies.")
+VERDICT = typer.Option("", "--verdict", help="in_tolerance, out_of_tolerance, uncertain, "
+                       "incomplete.")
+PRODUCTION = typer.Option(False, "--production", help="Without trials.")
+LAST = typer.Option(None, "--last", min=1, help="Only the last so many.")
+JSON = typer.Option(False, "--json", help="Print one JSON object.")
+
+
+@results_app.command("list")
+def list_results(logs: Path = LOGS, database: str | None = URL, since: datetime | None = SINCE,
+                 until: datetime | None = UNTIL, job: str = JOB, verdict: str = VERDICT,
+                 production: bool = PRODUCTION, last: int | None = LAST,
+                 as_json: bool = JSON) -> None:
+    """List bodies, the latest first."""
+    from cell.programs.results import opened
+    from cell.results.query import list_bodies
+
+    with opened(logs, database) as found:
+        rows = list_bodies(found, _filter(since, until, job, verdict, production, last))
+    if as_json:
+        print_json({"bodies": rows})
+    else:
+        _print_bodies(rows)
+
+
+@results_app.command("show")
+def show_results(body: str = typer.Argument(..., help="A body's number or a recording's id."),
+                 logs: Path = LOGS, database: str | None = URL, as_json: bool = JSON) -> None:
+    """Show every axis of one body."""
+    from cell.programs.results import opened
+    from cell.results.query import show_body
+
+    with opened(logs, database) as found:
+        shown = show_body(found, body)
+    if shown is None:
+        raise DocumentError(f"there is no body or recording {body!r} in the database")
+    if as_json:
+        print_json({"body": shown[0], "axes": shown[1]})
+    else:
+        _print_bodies([shown[0]])
+        _print_axes(shown[1])
+
+
+@results_app.command("trend")
+def show_trend(feature: str, axis: str, logs: Path = LOGS, database: str | None = URL,
+               since: datetime | None = SINCE, until: datetime | None = UNTIL,
+               production: bool = PRODUCTION, last: int | None = LAST,
+               as_json: bool = JSON) -> None:
+    """Follow the deviation of one axis of one feature over the bodies."""
+    from cell.programs.results import opened, utc
+    from cell.results.query import trend
+
+    with opened(logs, database) as found:
+        points = trend(found, feature, axis, _filter(since, until, "", "", production, last))
+    if as_json:
+        print_json({"feature": feature, "axis": axis, "points": [vars(point) for point in points]})
+        return
+    for point in points:
+        answers.print(f"{utc(point.started)}  {point.body_id:<24} {_number(point.deviation)} "
+                      f"± {_number(point.uncertainty)}  {point.verdict or ''}", highlight=False)
+
+
+@results_app.command("export")
+def export_results(to: Path = typer.Argument(..., help="The CSV file; - writes to the terminal."),
+                   logs: Path = LOGS, database: str | None = URL, since: datetime | None = SINCE,
+                   until: datetime | None = UNTIL, job: str = JOB, verdict: str = VERDICT,
+                   production: bool = PRODUCTION, last: int | None = LAST) -> None:
+    """Export every axis of the bodies as CSV, one line an axis."""
+    from cell.programs.results import opened, write_csv
+    from cell.results.query import export_rows
+
+    wanted = _filter(since, until, job, verdict, production, last)
+    with opened(logs, database) as found:
+        if str(to) == "-":
+            count = write_csv(export_rows(found, wanted), sys.stdout)
+        else:
+            try:
+                with to.open("w", newline="", encoding="utf-8") as stream:
+                    count = write_csv(export_rows(found, wanted), stream)
+            except OSError as error:
+                raise DocumentError(f"cannot be written: {error.strerror}",
+                                    source=str(to)) from error
+    console.print(f"{count} lines")
+
+
+@results_app.command("rebuild")
+def rebuild_results(logs: Path = LOGS, database: str | None = URL, as_json: bool = JSON) -> None:
+    """Make the rows of all recordings again. Approvals, faults and bypasses stay as they are."""
+    from rich.progress import Progress
+
+    from cell.programs.results import opened, rebuild
+
+    with opened(logs, database) as found, Progress(console=console, transient=True) as progress:
+        task = progress.add_task("recordings", total=None)
+        troubles = rebuild(found, logs, lambda done, of: progress.update(task, completed=done,
+                                                                         total=of))
+    if as_json:
+        print_json({"ok": not troubles, "not_read": troubles})
+    for trouble in troubles:
+        console.print(f"not read: {trouble}", highlight=False)
+    raise typer.Exit(OUT_OF_TOLERANCE if troubles else 0)
+
+
+def _filter(since: datetime | None, until: datetime | None, job: str, verdict: str,
+            production: bool, last: int | None) -> Filter:
+    from cell.results.query import Filter
+
+    return Filter(_seconds(since), _seconds(until), job, verdict, production_only=production,
+                  last=last)
+
+
+def _seconds(moment: datetime | None) -> float | None:
+    return None if moment is None else moment.replace(tzinfo=UTC).timestamp()
+
+
+def _print_bodies(rows: list[dict[str, Any]]) -> None:
+    from rich.table import Table
+
+    from cell.programs.results import utc
+
+    table = Table("started", "body", "job", "verdict", "holes", "out", "missing", "worst mm", "")
+    for row in rows:
+        table.add_row(utc(row["started"]), row["body_id"], row["job"],
+                      row["verdict"].replace("_", " "), str(row["measured"]),
+                      str(row["out_of_tolerance"]), str(row["missing"]), _number(row["worst"]),
+                      " ".join(word for word, on in (("TRIAL", row["trial"]),
+                                                     (row["status"], row["status"] != "complete"))
+                               if on))
+    answers.print(table)
+
+
+def _print_axes(rows: list[dict[str, Any]]) -> None:
+    from rich.table import Table
+
+    table = Table("hole", "axis", "nominal", "measured", "deviation", "tolerance", "u (k=1)",
+                  "verdict")
+    for row in rows:
+        verdict = row["reason"] or (row["verdict"] or "").replace("_", " ")
+        table.add_row(row["feature"], row["axis"] or "",
+                      *(_number(row[name]) for name in ("nominal", "measured", "deviation",
+                                                        "tolerance", "uncertainty")), verdict)
+    answers.print(table)
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f}"

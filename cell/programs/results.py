@@ -1,0 +1,121 @@
+"""The results database as a program uses it: opened, made again from the recordings, exported."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TextIO
+
+from sqlalchemy import Connection, select
+
+from cell.core.documents.papers import Papers
+from cell.core.documents.record import HoleRecord, Start, Stop
+from cell.core.errors import DocumentError
+from cell.metrology.decide import judge_run
+from cell.recording.pages import PRUNED, Page, read_pages
+from cell.results.booking import BodyRows, Booking, Row, body_rows, book
+from cell.results.database import Database, open_database, recreate_results
+from cell.results.tables import bodies
+
+FILE = "results.sqlite"
+
+COLUMNS = ("body_id", "recording_id", "time_utc", "job", "cell", "set_id", "trial", "simulated",
+           "status", "body_verdict", "feature", "feature_verdict", "reason", "axis", "nominal",
+           "measured", "deviation", "tolerance", "uncertainty", "bias", "verdict")
+
+
+@contextmanager
+def opened(logs: Path, url: str | None = None) -> Iterator[Database]:
+    """Open the database at `url`, or the cell's own beside its recordings; close it afterwards."""
+    if url is None and not logs.is_dir():
+        raise DocumentError("there is no such folder of recordings", source=str(logs))
+    database = open_database(url or logs / FILE)
+    try:
+        yield database
+    finally:
+        database.close()
+
+
+def rebuild(database: Database, logs: Path, watch: Callable[[int, int], None]) -> list[str]:
+    """Make the rows of all recordings again, and return what could not be read."""
+    files = sorted(logs.glob("*.rrd"))
+    with database.transaction() as connection:
+        recreate_results(connection)
+    troubles = []
+    for count, log in enumerate(files, start=1):
+        try:
+            rows = read_rows(log)
+        except DocumentError as error:
+            troubles.append(str(error))
+            continue
+        with database.transaction() as connection:
+            book(connection, rows)
+        watch(count, len(files))
+    return troubles
+
+
+def book_missing(connection: Connection, logs: Path) -> None:
+    """Book the recordings that a killed program had no time to book."""
+    known = set(connection.execute(select(bodies.c.log)).scalars())
+    for log in sorted(logs.glob("*.rrd")):
+        if log.name not in known:
+            try:
+                book(connection, read_rows(log))
+            except DocumentError:
+                continue  # `cell results rebuild` names it
+
+
+def read_rows(log: Path) -> BodyRows:
+    """Turn a recording into its rows. One that died is judged by the holes that it holds.
+
+    Raises:
+        DocumentError: it is no recording, or its papers are not whole.
+    """
+    start, records, stop, chain = _papers_of(read_pages(log))
+    papers = Papers.parse(start.papers, start.set_id)
+    left = None if stop else judge_run(papers, start, records)
+    return body_rows(Booking(start, stop, papers.job.name, papers.station.name, log.name, chain,
+                             left))
+
+
+def write_csv(rows: Iterable[Row], stream: TextIO) -> int:
+    """Write one line an axis; returns how many. Times are UTC, ISO 8601."""
+    writer = csv.DictWriter(stream, COLUMNS, extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    count = 0
+    for row in rows:
+        writer.writerow({**row, "time_utc": utc(row["started"])})
+        count += 1
+    return count
+
+
+def utc(moment: float | None) -> str:
+    """Write a time as 2026-11-22T12:00:00Z; empty where there is none."""
+    if moment is None:
+        return ""
+    return datetime.fromtimestamp(moment, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+def _papers_of(pages: Iterator[Page]) -> tuple[Start, list[HoleRecord], Stop | None, str]:
+    """Gather the records of a recording, without its images, and the head of its chain."""
+    start = stop = None
+    records, chain = [], ""
+    for page in pages:
+        chain = page.chain
+        if isinstance(page.record, Start):
+            start = page.record
+        elif isinstance(page.record, HoleRecord):
+            records.append(_without_images(page.record))
+        elif isinstance(page.record, Stop):
+            stop = page.record
+    assert start is not None  # `read_pages` sees to it
+    return start, records, stop, chain
+
+
+def _without_images(record: HoleRecord) -> HoleRecord:
+    views = tuple(replace(view, image=PRUNED) for view in record.observation.views)
+    return replace(record, observation=replace(record.observation, views=views))
