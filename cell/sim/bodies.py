@@ -33,7 +33,8 @@ class Delivery:
 class Bore:
     """One hole in a sheet: centre (u, v) on the outer face, radius, and its form's harmonics.
 
-    `form` (2, n) holds cosine and sine amplitudes in mm of orders 2, 3, ...
+    A radius of 0 is a hole that was forgotten. `form` (2, n) holds cosine and sine amplitudes in mm
+    of orders 2, 3, ...
     """
 
     id: str
@@ -45,7 +46,7 @@ class Bore:
     def outside(self, u: Array, v: Array) -> Array:
         """Return how far outside of the rim places (...) on the sheet lie, in mm."""
         across, up = u - self.centre[0], v - self.centre[1]
-        beyond = np.hypot(across, up) - self.radius
+        beyond = np.sqrt(across * across + up * up) - self.radius
         near = np.abs(beyond) < NEAR_RIM
         turns = np.multiply.outer(np.arctan2(up[near], across[near]), FORM_ORDERS)
         beyond[near] -= np.cos(turns) @ self.form[0] + np.sin(turns) @ self.form[1]
@@ -130,8 +131,9 @@ def _draw_bore(errors: BodyErrors, hole: HoleScene, delivery: Delivery) -> Bore:
     u, v, diameter = np.add(hole.off, delivery.off.get(hole.id, (0.0, 0.0, 0.0)))
     centre = np.array(hole.at) + (u, v) + errors.hole_mm * chance.standard_normal(2)
     radius = hole.radius + 0.5 * (diameter + errors.diameter_mm * chance.standard_normal())
+    radius = max(float(radius), 0.0)
     form = errors.form_mm * chance.standard_normal((2, len(FORM_ORDERS))) / FORM_ORDERS
-    return Bore(hole.id, centre, float(radius), form, hole.drawn_on)
+    return Bore(hole.id, centre, radius, form, hole.drawn_on)
 
 
 def _describe(sheet: Sheet, bore: Bore) -> dict[str, Any]:

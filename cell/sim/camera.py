@@ -17,6 +17,7 @@ from cell.core.errors import DeviceError
 from cell.core.observation import Image
 from cell.core.ports import CameraTimeoutError
 from cell.sim.bodies import Body, Delivery, draw_body, master
+from cell.sim.body_shop import BodyShop
 from cell.sim.scene import Board, SceneDocument, Sphere, read_scene
 
 Fault = Literal["late_image", "lost_trigger", "lost", "dark_laser", "dark_ring", "wrong_size"]
@@ -134,6 +135,12 @@ class SimulatedCamera:
         if self._link is not None:
             self._tell("deliver", delivery)
             self._answer("done")
+
+    def deliver_number(self, number: int) -> dict[str, str]:
+        """Put body `number` of the body shop on the station; say what is wrong with which hole."""
+        built = BodyShop(self._scene).build(number)
+        self.deliver(built.delivery)
+        return built.faults
 
     def deliver_master(self) -> None:
         """Put the master body on the station: measured by a CMM, sitting true in the fixture."""

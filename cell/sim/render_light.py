@@ -17,7 +17,7 @@ from cell.sim.scene import SensorScene
 from cell.sim.world import TrueSensor
 
 LEDS = 16
-REACH = 5.0  # sigmas of the sheet of light beyond which there is none
+FAINT = 1.0  # grey values a second that no exposure shows
 GRAZING = 0.05
 
 
@@ -78,7 +78,8 @@ class Lamps:
 
     def speckled(self, stripe: Light, finish: Finish) -> Light:
         """Break laser light up into speckles of a pixel, which the lens then correlates."""
-        rows, columns = np.nonzero(stripe.any(axis=1))[0], np.nonzero(stripe.any(axis=0))[0]
+        lit = stripe > FAINT
+        rows, columns = np.nonzero(lit.any(axis=1))[0], np.nonzero(lit.any(axis=0))[0]
         contrast = finish.speckle * self.design.speckle
         if not len(rows) or contrast == 0.0:
             return stripe

@@ -32,6 +32,8 @@ def render_sheet(lens: Lens, lamps: Lamps, camera_from_sheet: Transform,
 
 def _window(lens: Lens, camera_from_sheet: Transform, bore: Bore) -> Window | None:
     """Return the rectangle of pixels that a bore may touch, if any."""
+    if bore.radius == 0.0:
+        return None
     angles = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
     circle = 1.1 * bore.radius * np.column_stack([np.cos(angles), np.sin(angles)])
     rim = camera_from_sheet @ np.column_stack([bore.centre + circle, np.zeros(16)])

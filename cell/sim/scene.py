@@ -18,7 +18,8 @@ from cell.core.errors import DocumentError
 
 Positive = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)]
 Magnitude = Annotated[float, Field(ge=0, strict=True, allow_inf_nan=False)]
-Finish = Literal["steel", "galvanised", "ecoat_grey", "ecoat_black", "primer"]
+Finish = Literal["steel", "galvanised", "ecoat_grey", "ecoat_black", "primer",
+                 "ceramic"]
 
 
 class SensorScene(Document):
@@ -107,6 +108,16 @@ class BodyErrors(Document):
     thickness_mm: Magnitude = 0.0
 
 
+class ShopScene(Document):
+    """How the body shop varies: panels wander by `drift_mm` over a tool's life of `tool_life`
+    bodies, and a share of bodies has a bad hole.
+    """
+
+    drift_mm: Magnitude = 0.0
+    tool_life: Annotated[int, Field(ge=1)] = 150
+    bad_share: Annotated[float, Field(ge=0, le=1)] = 0.0
+
+
 class Behind(Document):
     """A second sheet behind a panel, parallel to it, `gap_mm` from its back."""
 
@@ -182,6 +193,7 @@ class SceneDocument(Document):
     base_from_fixture: Matrix4
     fixture_errors: PoseErrors = PoseErrors()
     bodies: BodyErrors
+    shop: ShopScene = ShopScene()
     panels: tuple[Panel, ...]
     holes: tuple[HoleScene, ...]
     boards: tuple[Board, ...] = ()
