@@ -19,7 +19,7 @@ SETTING = Setting(WORLD.base_from_fixture, None, (BOARD,), (SPHERE,))
 
 
 def over(point, *, distance=242.0, turn_deg=(0.0, 0.0, 0.0), frame=None):
-    """base_from_camera that looks at a point along the z axis of a frame, then leaned and rolled."""
+    """base_from_camera that looks at a point along the z axis of a frame, leaned and rolled."""
     lean = Rotation.from_euler("zxy", turn_deg, degrees=True).as_matrix()
     turn = (np.diag([1.0, -1.0, -1.0]) if frame is None else frame.rotation) @ lean
     return Transform.from_parts(turn, point - distance * turn[:, 2])
@@ -73,7 +73,7 @@ def test_the_stripe_on_the_board_lies_in_the_light_plane_and_on_the_board():
 
 def test_the_sphere_is_where_it_is_and_as_large():
     centre = np.array(SPHERE.centre)
-    pose = over(centre + [3.0, -2.0, 0.0], distance=250.0, turn_deg=(40, 3, -4))
+    pose = over(centre + np.array([3.0, -2.0, 0.0]), distance=250.0, turn_deg=(40, 3, -4))
     image = picture(pose, noise=None).astype(float)
     level = cv2.GaussianBlur(image, (0, 0), 1.0)
     contour = max(cv2.findContours((level > 24).astype(np.uint8), cv2.RETR_EXTERNAL,
