@@ -17,8 +17,8 @@ from cell.core.geometry import Array
 from cell.metrology.joint_problem import Prior, Problem, Solution, solve
 from cell.metrology.joint_rows import RADIUS, Circle
 
-NARROW = 0.025  # rad: a turn within which the equations are as good as linear
-WIDE = 3.0  # of the prior's standard deviations that are covered
+NARROW = 0.035  # rad: a turn within which the equations are as good as linear
+WIDE = 2.5  # of the prior's standard deviations that are covered
 NEGLIGIBLE = 1e-4  # of the weight
 
 
@@ -52,8 +52,8 @@ def solve_all(problem: Problem, start: Circle) -> Posterior:
         return Posterior((solve(problem, start),), np.ones(1))
     solutions, logarithms = [], []
     for prior, logarithm in _narrow(problem.prior):
-        begun = replace(start, turn=prior.turn)
-        solution = solve(replace(problem, prior=prior), begun)
+        solution = solve(replace(problem, prior=prior), replace(start, turn=prior.turn))
+        start = solution.circle  # the next one is not far
         solutions.append(solution)
         logarithms.append(logarithm + solution.log_evidence)
     weights = np.exp(np.array(logarithms) - max(logarithms))
