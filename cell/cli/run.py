@@ -30,6 +30,9 @@ def run(
                                                     "than real time."),
     truth: Path | None = typer.Option(None, help="After the run, write what the simulator knows "
                                                  "to this file (simulated cells only)."),
+    part_temperature: float | None = typer.Option(
+        None, min=-40.0, max=80.0, help="The body's temperature in degrees C, where the job scales "
+                                        "to 20; the job's own unless given."),
     as_json: bool = typer.Option(False, "--json", help="Print one JSON object on standard "
                                                        "output."),
 ) -> None:
@@ -45,7 +48,8 @@ def run(
 
     signal.signal(signal.SIGTERM, _interrupt)
     with _Progress() as progress:
-        finished = run_job(Request(job, cell, body, logs, speed, truth), progress.advance)
+        request = Request(job, cell, body, logs, speed, truth, part_temperature)
+        finished = run_job(request, progress.advance)
     if as_json:
         print_json(_as_json(finished))
     else:

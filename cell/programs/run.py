@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import secrets
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -30,6 +31,13 @@ class Request:
     logs: Path = Path("logs")
     speed: float = 1.0
     truth: Path | None = None
+    part_temperature_c: float | None = None
+
+    @property
+    def conditions(self) -> dict[str, float]:
+        """The numbers of the day that enter the judgement."""
+        known = {"part_temperature_c": self.part_temperature_c}
+        return {name: value for name, value in known.items() if value is not None}
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +68,7 @@ def run_job(request: Request, watch: Watch) -> Finished:
     watch(0, len(prepared.stops), "opening the cell")
     with open_station(prepared.papers.station, prepared.folder, request.speed) as station:
         prepared.check_identity(station.identity)
-        start = begin(prepared, station, body_id, log.stem)
+        start = begin(prepared, station, body_id, log.stem, conditions=request.conditions)
         inspection = BodyInspection(station, prepared, start, Recorder(log, start), watch)
         status = measure(inspection)
         if request.truth is not None and station.world is not None:
@@ -69,11 +77,21 @@ def run_job(request: Request, watch: Watch) -> Finished:
     return Finished(body_id, status, inspection.result, log, report)
 
 
-def begin(prepared: Prepared, station: Station, body_id: str, recording_id: str) -> Start:
-    """Write down everything that is known before the first move."""
+def begin(prepared: Prepared, station: Station, body_id: str, recording_id: str, *,
+          conditions: Mapping[str, float] | None = None, trial: bool = True) -> Start:
+    """Write down everything that is known before the first move.
+
+    Args:
+        prepared: the job.
+        station: the open cell.
+        body_id: the body's number; it stands in the recording, never in a file's name.
+        recording_id: the recording's own.
+        conditions: numbers of the day that enter the judgement, such as `part_temperature_c`.
+        trial: whether job or calibration lack the approval for production.
+    """
     return Start(recording_id, body_id, time.time(), prepared.papers.set_id, prepared.papers.texts,
-                 collect_versions(), station.identity.as_text(), prepared.conditions,
-                 trial=True, simulated=station.document.simulated)
+                 collect_versions(), station.identity.as_text(), dict(conditions or {}),
+                 trial=trial, simulated=station.document.simulated)
 
 
 def write_report(log: Path, start: Start, inspection: BodyInspection) -> Path:

@@ -90,7 +90,7 @@ def test_a_calibration_of_another_robot_is_refused_before_anything_moves(plant: 
     assert not list((plant / "logs").glob("*.rrd"))
 
 
-def test_a_disk_that_fills_during_the_run_ends_with_4_and_keeps_the_whole_holes(plant: Path) -> None:
+def test_a_disk_that_fills_ends_the_run_with_4_and_keeps_the_whole_holes(plant: Path) -> None:
     done = cell_run(plant, "--speed", "10", most_bytes=3_000_000)
     refusal(done, 4)
     (log,) = (plant / "logs").glob("*.rrd")

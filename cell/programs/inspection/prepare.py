@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from cell.archive.papers import read_papers
@@ -17,14 +16,13 @@ from cell.metrology.plan import PlannedStop, plan_stops
 class Prepared:
     """A job ready to run: what its papers say, and the stops in order.
 
-    `folder` is the cell's own; `conditions` are numbers of the day that enter the judgement.
+    `folder` is the cell's own.
     """
 
     papers: Papers
     folder: Path
     arm: Arm
     stops: tuple[PlannedStop, ...]
-    conditions: Mapping[str, float] = field(default_factory=dict)
 
     def check_identity(self, identity: RobotIdentity) -> None:
         """Refuse a robot other than the one that the calibration set was made with."""
