@@ -39,6 +39,12 @@ class Page:
     missing: int = 0
 
 
+def without_images(record: HoleRecord) -> HoleRecord:
+    """Keep what a judgement needs of a hole, so that many fit into memory."""
+    views = tuple(replace(view, image=PRUNED) for view in record.observation.views)
+    return replace(record, observation=replace(record.observation, views=views))
+
+
 def read_pages(path: Path) -> Iterator[Page]:
     """Turn the pages of a recording: the start, the holes, the stop. Holds two holes at a time.
 

@@ -13,11 +13,13 @@ from typing import Any, Protocol
 import pyarrow as pa
 
 from cell.core.documents.record import HoleRecord, Start, Stop
+from cell.core.documents.result import Measured
 from cell.core.errors import DocumentError
 from cell.recording import layout
 from cell.recording.chain import NOTHING, link, text_hash
 from cell.recording.forms import Plain, form_of
 from cell.recording.keys import key_path, read_key
+from cell.recording.picture import Picture
 from cell.recording.seal import Closed, write_seal
 from cell.recording.stream import Stream
 
@@ -113,18 +115,23 @@ class Recorder:
             self._stream.write_text(f"{layout.PAPERS}/{name}", text)
         hashes = {name: text_hash(text) for name, text in start.papers.items()}
         self._write_record(layout.START, replace(start, papers=hashes))
+        self._picture = Picture(self._stream.rerun, start)
 
     def _write_hole(self, record: HoleRecord) -> None:
         self._stream.at(layout.HOLE_TIMELINE, self._holes)
         plain = self._write_record(layout.HOLE, record)
-        for view, seen in zip(record.observation.views, plain["observation"]["views"], strict=True):
-            self._stream.at(layout.VIEW_TIMELINE, self._views)
-            self._stream.write_image(f"{layout.CAMERA}/{view.light}", view.image, seen["image"])
-            self._views += 1
+        hashes = [view["image"] for view in plain["observation"]["views"]]
+        for index in _shown_last(record):
+            view = record.observation.views[index]
+            self._stream.at(layout.VIEW_TIMELINE, self._views + index)
+            self._stream.write_image(f"{layout.CAMERA}/{view.light}", view.image, hashes[index])
+        self._picture.add(self._holes, record)
+        self._views += len(hashes)
         self._holes += 1
 
     def _write_stop(self, stop: Stop) -> None:
         self._write_record(layout.STOP, stop)
+        self._picture.finish(stop)
 
     def _write_record(self, place: layout.Place, record: object) -> Plain:
         form = form_of(place.kind)
@@ -132,6 +139,13 @@ class Recorder:
         self._chain = link(self._chain, plain)
         self._stream.write_record(place, pa.array([plain], type=form.column), self._chain)
         return plain
+
+
+def _shown_last(record: HoleRecord) -> list[int]:
+    """Order the views so that those that count come last: the viewer shows the last."""
+    views, outcome = record.observation.views, record.outcome if record.attempts else None
+    counts = views[outcome.reference].attempt if isinstance(outcome, Measured) else -1
+    return sorted(range(len(views)), key=lambda index: views[index].attempt == counts)
 
 
 def _new_stream(path: Path, recording_id: str) -> Stream:

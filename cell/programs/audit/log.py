@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from cell.core.documents.record import HoleRecord, Start, Stop
+from cell.core.documents.record import Attempt, HoleRecord, Start, Stop
 from cell.core.documents.result import BodyResult, Outcome
 from cell.core.errors import DocumentError
 from cell.metrology.decide import judge_run
@@ -20,7 +20,7 @@ from cell.programs.audit.question import Question
 from cell.programs.audit.report import Change, LogAudit
 from cell.recording.forms import as_recorded
 from cell.recording.integrity import Check, check_chain, check_images, check_seal
-from cell.recording.pages import PRUNED, Page, read_pages
+from cell.recording.pages import Page, read_pages, without_images
 from cell.recording.seal import Seal
 from cell.recording.versions import collect_versions
 
@@ -110,22 +110,25 @@ class _Audit:
             _changes(recorded, then) if recorded is not None and self._what_if else ())
 
     def _measure(self, record: HoleRecord, pruned: bool) -> None:
-        self._recorded.append(_without_images(record))
+        self._recorded.append(without_images(record))
         if pruned:
             self._skipped += 1
-            self._then.append(_without_images(record))
+            self._then.append(without_images(record))
             return
         again = record.attempts[-1:] if self._what_if else record.attempts
-        then = tuple(replace(attempt, outcome=self._outcome(record, attempt.views))
-                     for attempt in again)
+        then = tuple(replace(attempt, outcome=self._outcome(record, attempt)) for attempt in again)
         if not self._what_if:
             for number, (was, now) in enumerate(zip(record.attempts, then, strict=True)):
                 self._tally(compare(f"{record.observation.hole_id} attempt {number}", was, now))
-        self._then.append(_without_images(replace(record, attempts=then)))
+        self._then.append(without_images(replace(record, attempts=then)))
 
-    def _outcome(self, record: HoleRecord, views: int) -> Outcome:
-        """Measure a hole as it was after `views` views: the very function that ran live."""
-        papers, observation = self._papers, record.observation.first(views)
+    def _outcome(self, record: HoleRecord, attempt: Attempt) -> Outcome:
+        """Measure a hole from the views of an attempt: the very function that ran live. A hole that
+        was left out was not measured then, and is not now.
+        """
+        if not attempt.views:
+            return attempt.outcome
+        papers, observation = self._papers, record.observation.first(attempt.views)
         return measure_hole(observation, papers.hole(observation.hole_id), papers.calibration,
                             papers.job.method, np.radians(papers.job.normal_sigma_deg))
 
@@ -136,12 +139,6 @@ class _Audit:
             self._numbers[level] += comparison.numbers
             if difference is not None:
                 self._differences.append(difference)
-
-
-def _without_images(record: HoleRecord) -> HoleRecord:
-    """Keep what a judgement needs: a month of bodies must fit into memory."""
-    views = tuple(replace(view, image=PRUNED) for view in record.observation.views)
-    return replace(record, observation=replace(record.observation, views=views))
 
 
 def _versions_that_differ(start: Start) -> dict[str, tuple[str, str]]:
