@@ -73,23 +73,15 @@ class LineSettings(Document):
     patience_s: Positive = 3.0
 
 
-class BodyShop(Document):
-    """What `--simulate` lets the line bring: a body shop that drifts, and now and then a bad body.
-
-    `drift_mm` moves the panels `drifting` by so much (u, v, outward) within `drift_bodies`; one
-    body in `bad_every` has a hole that is `bad_mm` out of place. Every `unknown_every`-th body is
-    of a type that nobody has told the cell.
+class Simulation(Document):
+    """What the virtual line of `--simulate` brings: the bodies of the scene's body shop from number
+    `first` on; every `unknown_every`-th is of a type that nobody has told the cell (0: none).
+    Somebody presses reset `repair_s` after a fault.
     """
 
-    seed: int = 1
-    drifting: tuple[str, ...] = ()
-    drift_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    drift_bodies: Count = 100
-    bad_every: Annotated[int, Field(ge=0)] = 8
-    bad_holes: tuple[str, ...] = ()
-    bad_mm: NotNegative = 4.0
+    first: Annotated[int, Field(ge=0)] = 1
     unknown_every: Annotated[int, Field(ge=0)] = 0
-    repair_s: NotNegative = 1.0
+    repair_s: NotNegative = 2.0
 
 
 class ShiftDocument(Document):
@@ -106,7 +98,7 @@ class ShiftDocument(Document):
     bypass: BypassRules = BypassRules()
     line: LineSettings = LineSettings()
     results: str | None = None
-    simulation: BodyShop = BodyShop()
+    simulation: Simulation = Simulation()
 
     @model_validator(mode="after")
     def _types_are_unique(self) -> ShiftDocument:

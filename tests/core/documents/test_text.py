@@ -1,12 +1,15 @@
 import math
 
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cell.core.documents import strict_yaml
 from cell.core.documents.base import Document, Number
 from cell.core.documents.job import JobDocument
-from cell.core.documents.text import dump, parse, read_tree
+from cell.core.documents.strict_yaml import read_tree
+from cell.core.documents.text import dump, parse
 from cell.core.errors import DocumentError
 
 JOB = "name: sill\ncell: demo\nnominals: sill.csv\n"
@@ -45,7 +48,7 @@ def refusal(text: str) -> str:
     ("# nothing here\n", ["expected a mapping", "came nothing"]),
     ("just words", ["expected a mapping", "'just words'"]),
     ("- name\n", ["expected a mapping", "list"]),
-    (JOB + "---\n" + JOB, ["line 4", "another document"]),
+    (JOB + "---\n" + JOB, ["line 4", "expected one document"]),
     (JOB + "stops: [\n", ["not valid YAML", "line 5"]),
     (JOB + "retry:\n\tattempts: 2\n", ["line 5", "a tab", "spaces"]),
     (JOB + "stops: !!python/object/apply:os.system ['true']\n", ["line 4", "tag", "os.system"]),
@@ -57,7 +60,10 @@ def refusal(text: str) -> str:
     ("name: \x00\n", ["not valid YAML"]),
     ("x" * 1_000_001, ["1000001 characters"]),
 ])
-def test_a_wrong_document_is_refused_by_line_key_expected_and_came(text, words):
+@pytest.mark.parametrize("loader", [yaml.SafeLoader, strict_yaml.LOADER])
+def test_a_wrong_document_is_refused_by_line_key_expected_and_came(text, words, loader,
+                                                                   monkeypatch):
+    monkeypatch.setattr(strict_yaml, "LOADER", loader)
     message = refusal(text)
     missing = [word for word in words if word not in message]
     assert not missing, message
@@ -120,8 +126,6 @@ def test_no_text_leads_to_anything_but_a_document_or_a_refusal(text):
                     | st.dictionaries(st.sampled_from(sorted(JobDocument.model_fields)) | st.text(
                         max_size=5), inner, max_size=4), max_leaves=12))
 def test_no_structure_leads_to_anything_but_a_document_or_a_refusal(value):
-    import yaml
-
     text = yaml.safe_dump(value)
     try:
         parse(JobDocument, JOB + "stops: " + "\n  ".join(["", *text.splitlines()]), "any")
