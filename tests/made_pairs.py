@@ -46,7 +46,7 @@ class Scene:
         """Render both pictures."""
         return self.picture("ring", rng), self.picture("laser", rng)
 
-    def plan(self, rng, normal_sigma=np.radians(0.35)):
+    def plan(self, rng, normal_sigma=0.0061):
         """What a plan knows: normal and radius a little off, the thickness right."""
         across = np.linalg.svd(self.normal[None])[2][1:]
         normal = self.normal + normal_sigma * rng.normal(size=2) @ across
