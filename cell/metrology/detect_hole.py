@@ -22,11 +22,12 @@ from cell.metrology.profile import Profile, fit_profile, locate_edges
 from cell.metrology.reasons import refusal
 from cell.metrology.rim_fit import agree, settle
 from cell.metrology.spread import correlation_length, robust_sigma
-from cell.metrology.wall import predict_wall
+from cell.metrology.wall import predict_wall, suspect_walls
 
 WIDE = 8.0             # px to either side, where edges are looked for first
 OUTWARD = 3.0          # px of sheet in a grey profile: more would add its texture
 INWARD = 3.0           # px of hole beyond the wall
+MANY = 0.87            # profiles an edge, below which two rims may show
 ROUGH_SPACING, SPACING = 3.0, 1.5  # px along the rim
 SHARP = 0.9            # px of blur by the lens, above which the edge itself may be rounded
 SMALL_ROUGHNESS = 0.25  # px from end to end, which texture alone gives
@@ -53,30 +54,34 @@ def detect_rim(image: Image, hole: Hole, camera: CameraModel, expected: Expected
     """
     check_inside(image, hole.ellipse)
     check_whole(hole)
-    rough, agreed = _rough_rim(hole)
-    wall = predict_wall(rough, camera, expected)
-    band = _profiles(hole.patch, rough, wall.widest)
-    rays = np.interp(band.t, *agreed, period=2.0 * np.pi) > 0.5
-    profile = fit_profile(band, rays, wall)
+    rough, seen, doubled = _rough_rim(hole)
+    walls = [predict_wall(rough, hole.inside, camera, expected)]
+    if doubled and walls[0].share == 0.0:
+        walls += suspect_walls(walls[0])
+    band = _profiles(hole.patch, rough, max(wall.widest for wall in walls))
+    rays = np.repeat(seen, -(-len(band.t) // len(seen)))[:len(band.t)]
+    profile = fit_profile(band, rays, walls)
     edge, misfit = locate_edges(band, profile)
     good = rays & (misfit < 3.0 * np.median(misfit[rays])) & (np.abs(edge - profile.edge) < 2.0)
     return _rim(band, edge, good, profile, hole)
 
 
-def _rough_rim(hole: Hole) -> tuple[Ellipse, tuple[Array, Array]]:
-    """Fit the edges that agree: the ellipse, and where (t) it has one (1) and where not (0)."""
+def _rough_rim(hole: Hole) -> tuple[Ellipse, Mask, bool]:
+    """Fit the edges that agree: the ellipse, on which of its profiles they lie (n,), and whether
+    many profiles show more than one edge, as they do across a wall.
+    """
     rays = _rays(hole.ellipse, ROUGH_SPACING)
     band = sample_band(hole.patch, hole.ellipse, spread(WIDE, 0.5), rays)
     edges = find_edges(band, hole.inside, 0.3 * hole.contrast)
     agreed = edges[agree(band, edges, tolerance=2.0)[1]]
     ellipse, miss, scale = settle(band, agreed, floor=0.02)
-    seen = agreed[np.abs(miss) < 3.0 * scale].rays(rays)
-    return ellipse, (band.t, seen.astype(np.float64))
+    seen = agreed[np.abs(miss) < max(3.0 * scale, 1.0)].rays(rays)
+    return ellipse, seen, edges.rays(rays).sum() < MANY * len(edges.ray)
 
 
 def _profiles(patch: Patch, rim: Ellipse, wall_width: float) -> Band:
-    inward = INWARD + np.clip(wall_width, 0.0, 0.3 * rim.radius)
-    offsets = np.arange(-np.ceil(inward), OUTWARD + 0.5)
+    shown = np.clip(wall_width, 0.0, 0.3 * rim.radius)
+    offsets = np.arange(-np.ceil(INWARD + shown), max(OUTWARD, np.ceil(shown + 2.0)) + 0.5)
     return sample_band(patch, rim, offsets, _rays(rim, SPACING))
 
 

@@ -30,9 +30,9 @@ def detect_pair(hole_image: Image, stripe_image: Image, sensor: SensorModel,
     """
     upright = runs_upright(sensor.light_plane)
     ridge = find_ridge(stripe_image, upright=upright)
+    if np.median(hole_image) < np.median(stripe_image) and find_ridge(hole_image, upright=upright):
+        raise refusal("images_swapped")
     if ridge is None:
-        if find_ridge(hole_image, upright=upright) is not None and _is_dark(stripe_image):
-            raise refusal("images_swapped")
         raise refusal("no_laser")
     placed = _at_depth(expected, ridge, sensor)
     holes = find_holes(hole_image, sensor.camera, placed)
@@ -68,6 +68,3 @@ def _crossed(holes: Iterable[Hole], ridge: Ridge) -> Hole:
         raise refusal("laser_misses_hole" if strongest else "no_hole")
     return crossed
 
-
-def _is_dark(image: Image) -> bool:
-    return float(np.mean(image)) < 20.0

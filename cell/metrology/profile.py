@@ -23,7 +23,9 @@ from cell.metrology.wall import Wall
 
 STEPS = 6
 SHARE_SIGMA, SHARE_SWING = 0.2, 0.1   # of k before looking, and of its change round the rim
-DARKEST, BRIGHTEST = -0.6, 0.9        # k
+DARKEST, BRIGHTEST = -0.6, 1.3        # k
+CLEARLY = 0.95       # of the misfit
+NOTABLE_WALL = 1.5   # px
 NARROWEST, WIDEST, USUAL_BLUR = 0.4, 6.0, 1.2  # px
 PIXELS_PER_ERROR = 30.0  # texture and smoothing: so many pixels go wrong together
 
@@ -74,6 +76,13 @@ class RimModel:
                        self.shrink - self.normals @ x[6:8],
                        np.clip(self.around @ x[8:], DARKEST, BRIGHTEST))
 
+    def onto_near_rim(self, wall: Wall) -> Array:
+        """Give the move from the outline of what is seen through the bore to the near rim."""
+        outward = np.maximum(self.shrink - self.normals @ wall.shift, 0.0)
+        move = np.zeros_like(self.prior)
+        move[:5] = np.linalg.lstsq(self.design, outward, rcond=None)[0]
+        return move
+
     def linearise(self, grey: Array, x: Array) -> tuple[Array, Array]:
         """Give residuals (n, m) and how the model changes with the numbers (n, m, 11)."""
         step = _step(self.offsets, self.read(x))
@@ -85,12 +94,31 @@ class RimModel:
         return miss, _without_levels(slopes * height[:, None, None], step.shape)
 
 
-def fit_profile(band: Band, rays: Mask, wall: Wall) -> Profile:
-    """Fit ellipse, blur and wall together to the pixels of the `rays` (n,) that agree."""
-    model = RimModel(band, wall)
-    state = model.prior
+def fit_profile(band: Band, rays: Mask, walls: list[Wall]) -> Profile:
+    """Fit ellipse, blur and wall together to the pixels of the `rays` (n,) that agree.
+
+    Where a wall of some width is to be expected, the band's ellipse may lie on its far side: the
+    fit starts from both. Of all starts, the one that explains the pixels clearly better wins.
+    """
+    best, least = None, np.inf
+    for wall in walls:
+        model = RimModel(band, wall)
+        starts = [model.prior]
+        if wall.widest > NOTABLE_WALL:
+            starts.append(model.prior + model.onto_near_rim(wall))
+        for start in starts:
+            profile, misfit = _descend(model, band.grey, rays, start)
+            if best is None or misfit < CLEARLY * least:
+                best, least = profile, misfit
+    if best is None:
+        raise ValueError("a profile is fitted with at least one wall in mind")
+    return best
+
+
+def _descend(model: RimModel, grey: Array, rays: Mask, state: Array) -> tuple[Profile, float]:
+    """Fit from a start: the profile, and the typical misfit of a ray in grey values."""
     for _ in range(STEPS):
-        miss, slopes = model.linearise(band.grey, state)
+        miss, slopes = model.linearise(grey, state)
         rough = np.sqrt((miss**2).mean(axis=1))
         scale = max(float(np.median(rough[rays])), 1e-3)
         weight = rays * tukey_weights(np.maximum(rough - scale, 0.0), scale)
@@ -99,7 +127,9 @@ def fit_profile(band: Band, rays: Mask, wall: Wall) -> Profile:
         normal = flat.T @ slopes.reshape(-1, len(state)) + np.diag(stiff + 1e-9)
         right = flat.T @ miss.ravel() + stiff * (model.prior - state)
         state = state + np.clip(np.linalg.solve(normal, right), -0.5, 0.5)
-    return model.read(state)
+    profile = model.read(state)
+    miss, _ = _levels(grey, _step(model.offsets, profile).shape)
+    return profile, float(np.sqrt((miss[rays] ** 2).mean(axis=1)).mean())
 
 
 def locate_edges(band: Band, profile: Profile) -> tuple[Array, Array]:

@@ -16,9 +16,11 @@ from cell.core.optics import CameraModel
 from cell.metrology.ellipse import Ellipse, project_circle
 from cell.metrology.features import Expected
 
-USUAL_THICKNESS = 1.2  # mm
-USUAL_SHARE = 0.15     # of the step from hole to sheet, taken by a wall that is known to show
-USUAL_TILT = 0.06      # rad, the standard deviation of a tilt that nothing is known of
+USUAL_THICKNESS = 1.2   # mm
+USUAL_DISTANCE = 250.0  # mm
+SUSPECTED = 3.5         # px, the shift of a far rim that shows without having been predicted
+USUAL_SHARE = 0.15      # of the step from hole to sheet, taken by a wall that is known to show
+USUAL_TILT = 0.06       # rad, the standard deviation of a tilt that nothing is known of
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,20 +44,28 @@ class Wall:
         return self.shrink - normals @ self.shift
 
 
-def predict_wall(rim: Ellipse, camera: CameraModel, expected: Expected) -> Wall:
-    """Predict the visible wall from thickness, tilt and distance, as far as they are known."""
+def predict_wall(rim: Ellipse, inside: int, camera: CameraModel, expected: Expected) -> Wall:
+    """Predict the visible wall from thickness, tilt and distance, as far as they are known.
+
+    Under a bright opening (`inside` +1) the wall is as dark as the sheet, or darker.
+    """
     ray = camera.rays(rim.centre)
-    depth = float(expected.centre[2]) if expected.centre is not None else 250.0
+    depth = float(expected.centre[2]) if expected.centre is not None else USUAL_DISTANCE
     thickness = USUAL_THICKNESS if expected.thickness is None else expected.thickness
     normal = -ray / np.linalg.norm(ray) if expected.normal is None else expected.normal
     normal = normal * -np.sign(normal[2])
-    centre, radius = depth * ray, rim.radius * depth / camera.matrix[0, 0]
-    near = project_circle(camera, centre, normal, radius)
-    far = project_circle(camera, centre - thickness * normal, normal, radius)
-    unsure = USUAL_TILT if expected.normal is None else expected.normal_sigma
-    if expected.thickness is None:
-        unsure = np.hypot(unsure, USUAL_TILT)
-    sigma = 0.05 + thickness * unsure * float(camera.matrix[0, 0]) / depth
+    scale = float(camera.matrix[0, 0]) / depth
+    near = project_circle(camera, depth * ray, normal, rim.radius / scale)
+    far = project_circle(camera, depth * ray - thickness * normal, normal, rim.radius / scale)
     known = expected.thickness is not None and expected.normal is not None
-    return Wall(far.centre - near.centre, sigma, near.radius - far.radius,
-                USUAL_SHARE if known else 0.0)
+    unsure = expected.normal_sigma if known else USUAL_TILT
+    share = (USUAL_SHARE if inside < 0 else 1.0) if known else 0.0
+    return Wall(far.centre - near.centre, 0.05 + thickness * unsure * scale,
+                near.radius - far.radius, share)
+
+
+def suspect_walls(predicted: Wall) -> list[Wall]:
+    """List walls on all sides, for a rim that shows two edges where nothing was predicted."""
+    turn = np.arange(8) * np.pi / 4.0
+    return [Wall(SUSPECTED * np.array([np.cos(t), np.sin(t)]), SUSPECTED / 2.0, predicted.shrink,
+                 0.5) for t in turn]
