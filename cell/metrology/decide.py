@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import ndtri
 
-from cell.core.documents.job import Decision, Thermal
+from cell.core.documents.job import Decision, JobDocument
 from cell.core.documents.nominals import AXES, Hole
 from cell.core.documents.offsets import Offset
 from cell.core.documents.papers import Papers
@@ -86,7 +86,7 @@ def judge_body(papers: Papers, outcomes: Sequence[Outcome],
     """Judge all holes of a job, in its order; a hole without an outcome was not reached."""
     circumstances = circumstances or Circumstances()
     found = {outcome.hole_id: outcome for outcome in outcomes}
-    circles = {outcome.hole_id: _at_20_degrees(outcome, papers.job.thermal, circumstances)
+    circles = {outcome.hole_id: _at_20_degrees(outcome, papers.job, circumstances)
                for outcome in outcomes if isinstance(outcome, Measured)}
     aligned = align_body(papers.job.alignment,
                          [Placed(hole, circles[hole.id].centre, circles[hole.id].covariance[:3, :3])
@@ -107,15 +107,22 @@ def judge_axis(deviation: float, tolerance: float, sigma: float, decision: Decis
     return "out_of_tolerance" if abs(deviation) > tolerance + guard else "uncertain"
 
 
-def _at_20_degrees(outcome: Measured, thermal: Thermal | None,
-                   circumstances: Circumstances) -> _Circle:
-    if thermal is None:
-        return _Circle(outcome.centre, outcome.diameter, outcome.covariance)
+def _at_20_degrees(outcome: Measured, job: JobDocument, circumstances: Circumstances) -> _Circle:
+    covariance = _without_registration(outcome) if job.alignment.method != "fixture" \
+        else outcome.covariance
+    if job.thermal is None:
+        return _Circle(outcome.centre, outcome.diameter, covariance)
     measured = circumstances.part_temperature_c
-    warmer = (thermal.part_temperature_c if measured is None else measured) - REFERENCE_C
-    scale, fixed = 1.0 - thermal.expansion_per_kelvin * warmer, np.array(thermal.fixed_point)
-    return _Circle(fixed + scale * (outcome.centre - fixed), scale * outcome.diameter,
-                   outcome.covariance)
+    warmer = (job.thermal.part_temperature_c if measured is None else measured) - REFERENCE_C
+    fixed = np.array(job.thermal.fixed_point)
+    scale = 1.0 - job.thermal.expansion_per_kelvin * warmer
+    return _Circle(fixed + scale * (outcome.centre - fixed), scale * outcome.diameter, covariance)
+
+
+def _without_registration(outcome: Measured) -> Array:
+    """Take the body registration out of the variances: aligning takes its error out of the body."""
+    share = np.square(outcome.budget.get("registration", (0.0, 0.0, 0.0, 0.0)))
+    return np.diag(np.maximum(np.diag(outcome.covariance) - share, 0.0))
 
 
 def sort_offsets(papers: Papers, circumstances: Circumstances

@@ -229,6 +229,19 @@ def test_alignment_adds_to_the_uncertainty_what_its_datums_give(papers):
     assert aligned["d"] == pytest.approx(SIGMA)
 
 
+def test_alignment_takes_the_uncertainty_of_the_registration_out(papers):
+    """An error of the registration moves the whole body, and so does the alignment, back."""
+    known = body(papers, DISPLACED)
+    wide = np.diag(np.square([0.3, 0.3, 0.3, 0.0]))
+    unsure = [dataclasses.replace(hole, covariance=hole.covariance + wide,
+                                  budget={"registration": (0.3, 0.3, 0.3, 0.0)}) for hole in known]
+    fixture = by_id(judge_body(papers, unsure))["BP1"].uncertainty
+    assert fixture["x"] == pytest.approx(np.hypot(SIGMA, 0.3))
+    aligned = with_job(papers, alignment=BEST_FIT)
+    one, other = (by_id(judge_body(aligned, seen))["BP1"].uncertainty for seen in (known, unsure))
+    assert one == pytest.approx(other)
+
+
 def test_a_warm_body_is_scaled_to_20_degrees(papers):
     steel = Thermal(expansion_per_kelvin=11.5e-6, part_temperature_c=25.0,
                     fixed_point=(1400.0, -700.0, 600.0))
