@@ -28,8 +28,8 @@ class SimulatedStage:
         self.controller.outputs = int(on)
 
     def lose_an_image(self):
-        self.camera.set_fault("late_image", 1)
         self.camera._timeout = 0.1
+        self.camera.set_fault("late_image", 1)
 
     def find_it_again(self):
         self.camera._timeout = 20.0

@@ -12,7 +12,7 @@ from cell.core.kinematics import Arm
 from cell.core.ports import RobotState
 
 MM_PER_M = 1000.0
-STILL = 1e-3                     # rad/s
+STILL = 3e-3                     # rad/s: the noise of real joints at rest is below it
 MODEL_MM, MODEL_DEG = 20.0, 2.0  # a calibrated arm is nearer to its published kinematics
 
 

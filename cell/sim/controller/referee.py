@@ -4,7 +4,7 @@ A line in, a line out. Switches take `on` or `off`: safeguard, emergency_stop, l
 freeze_stream (no cyclic data), stall (the same cycle again and again), freeze (nothing is read or
 answered: a pulled cable), refuse_upload. Events: protective_stop, pause, kill_program, other_tcp
 (100 mm further out), cut (every client's connection ends), garbage, half_package (and then
-silence), restart (as if just started), die, truth (answers JSON).
+silence), restart (as if just started, parked), die, truth (answers JSON).
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Opening on a controller that is wrong, silent or stopped; and the way back after a stop."""
 
 import socket
+import struct
 import time
 
 import numpy as np
@@ -47,6 +48,32 @@ def test_a_controller_that_accepts_and_is_silent(settings):
     assert time.monotonic() - begun < 8.0
     for listener in listeners:
         listener.close()
+
+
+def test_a_controller_that_hangs_is_told_in_time(robot, emulator):
+    emulator.tell_referee("freeze on")
+    begun = time.monotonic()
+    with pytest.raises(DeviceError, match="does not speak RTDE"):
+        robot.open()
+    assert time.monotonic() - begun < 10.0
+
+
+def test_registers_that_another_client_holds_are_explained(robot, emulator, truth):
+    names = b"input_int_register_0"
+    with socket.create_connection((emulator.address, 30004), timeout=5.0) as fieldbus:
+        fieldbus.sendall(struct.pack(">HB", 3 + len(names), ord("I")) + names)
+        fieldbus.recv(100)
+        with pytest.raises(DeviceError, match="fieldbus"):
+            robot.open()
+    assert truth()["moves_started"] == 0
+    robot.open()
+
+
+def test_a_dashboard_connection_that_broke_is_made_anew(robot, emulator, truth):
+    robot.open()
+    robot._dashboard._link.shutdown(socket.SHUT_RDWR)
+    robot.stop()
+    assert truth()["runtime"] == "STOPPED"
 
 
 def test_another_model_is_named(emulator, settings, truth):
