@@ -38,6 +38,12 @@ class Datum:
     axes: str = "xyz"
     sigma: tuple[float, float, float] = (0.1, 0.1, 0.1)
 
+    @property
+    def weights(self) -> tuple[float, ...]:
+        """One over the standard uncertainty by body axis; 0 where it is not constrained."""
+        return tuple(1.0 / sigma if axis in self.axes else 0.0
+                     for axis, sigma in zip("xyz", self.sigma, strict=True))
+
 
 @dataclass(frozen=True, eq=False)
 class Registration:
@@ -146,14 +152,12 @@ def _miss_without(datum: Datum, datums: Sequence[Datum], guess: Transform) -> fl
 
 def _linearise(datums: Sequence[Datum], guess: Transform, pivot: Array) -> tuple[Array, Array]:
     """Stack one weighted row (6,) and one weighted gap a constraint."""
-    rows, gaps = [np.empty((0, 6))], [np.empty(0)]
-    for datum in datums:
-        axes = ["xyz".index(axis) for axis in datum.axes]
-        here = guess @ datum.measured
-        weight = 1.0 / np.array(datum.sigma)[axes]
-        rows.append(_motion(here - pivot)[axes] * weight[:, None])
-        gaps.append((here - datum.nominal)[axes] * weight)
-    return np.concatenate(rows), np.concatenate(gaps)
+    measured = np.reshape([datum.measured for datum in datums], (-1, 3))
+    nominal = np.reshape([datum.nominal for datum in datums], (-1, 3))
+    weights = np.reshape([datum.weights for datum in datums], (-1, 3))
+    here, held = guess @ measured, weights > 0.0
+    rows = _motion(here - pivot) * weights[..., None]
+    return rows[held], ((here - nominal) * weights)[held]
 
 
 def _held(rows: Array, span: float) -> Array:
