@@ -22,8 +22,10 @@ from cell.cli.report import report
 from cell.cli.results import results_app
 from cell.cli.run import run
 from cell.cli.seal_key import seal_key_app
+from cell.cli.shift import shift
 from cell.cli.sim import sim
 from cell.cli.study import study_app
+from cell.cli.view import view
 from cell.cli.words import console, print_json
 from cell.core.errors import BUG, INTERRUPTED, CellError
 
@@ -47,8 +49,10 @@ app.command()(error_model)
 app.add_typer(study_app)
 app.command()(approve)
 app.add_typer(results_app)
+app.command()(shift)
 app.command()(audit)
 app.command()(repair)
+app.command()(view)
 app.add_typer(seal_key_app)
 app.command()(check)
 app.command()(compare)

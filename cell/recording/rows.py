@@ -55,10 +55,21 @@ def read_rows(path: Path) -> Iterator[Row]:
     Raises:
         DocumentError: it cannot be read, is no recording, or its content is damaged.
     """
-    with _readable(path) as readable, damage_explained(path):
-        for chunk in _open(readable):
+    with open_chunks(path) as chunks:
+        for chunk in chunks:
             if is_audited(chunk.entity_path):
                 yield from _rows(chunk.entity_path, chunk.to_record_batch())
+
+
+@contextmanager
+def open_chunks(path: Path) -> Iterator[LazyChunkStream]:
+    """Open all that is whole of a recording, picture included.
+
+    Raises:
+        DocumentError: it cannot be read, is no recording, or its content is damaged.
+    """
+    with _readable(path) as readable, damage_explained(path):
+        yield _open(readable)
 
 
 def _rows(path: str, batch: pa.RecordBatch) -> Iterator[Row]:
