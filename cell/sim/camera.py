@@ -27,6 +27,7 @@ START_SECONDS = 30.0
 ANSWER_SECONDS = 10.0
 END_SECONDS = 2.0
 FOREVER = 1_000_000_000
+LATER = 1.5  # times the time-out: when a late image comes
 
 
 class SimulatedCamera:
@@ -61,8 +62,12 @@ class SimulatedCamera:
                 [sys.executable, "-m", "cell.sim.camera_process", str(theirs.fileno())],
                 pass_fds=[theirs.fileno()], start_new_session=True)
         self._link = Connection(ours.detach())
-        self._tell(self._path, self._address, self._speed, self._delivery)
-        self._answer("ready", START_SECONDS)
+        try:
+            self._tell(self._path, self._address, self._speed, self._delivery)
+            self._answer("ready", START_SECONDS)
+        except DeviceError:
+            self.close()
+            raise
         return self._size
 
     def snap(self, exposure: float) -> Image:
@@ -152,8 +157,10 @@ class SimulatedCamera:
         self._answer("done")
 
     def set_fault(self, fault: Fault, times: int = FOREVER) -> None:
-        """Have a fault strike the next `times` times; 0 ends it. `lost` kills the camera."""
-        self._tell("fault", fault, times)
+        """Have a fault strike the next `times` times; 0 ends it. `lost` kills the camera; a
+        `late_image` comes after `snap` has given up.
+        """
+        self._tell("fault", fault, times, LATER * self._timeout)
         if fault != "lost":
             self._answer("done")
 

@@ -37,7 +37,6 @@ from cell.sim.world import draw_world
 DIE_WITH_PARENT = 1       # prctl's PR_SET_PDEATHSIG
 CONNECT_SECONDS = 5.0
 REPORT_SECONDS = 2.0      # without a report for so long the controller has gone
-LATE_SECONDS = 1.5        # by which a late image comes later, in the camera's own time
 
 
 class VirtualCamera:
@@ -56,6 +55,7 @@ class VirtualCamera:
         self._queue: deque[tuple[float, Image]] = deque()
         self._ready_at = 0.0
         self._faults: dict[str, int] = {}
+        self._late = 0.0  # s
         self._orders: dict[str, Callable[..., None]] = {
             "fire": self._fire, "rearm": self._rearm, "deliver": self._deliver,
             "place": self._place, "fault": self._fault}
@@ -89,7 +89,7 @@ class VirtualCamera:
         image = self._expose(exposure)
         done = max(begun + exposure / self._speed, time.monotonic())
         self._ready_at = done
-        late = LATE_SECONDS / self._speed if self._happens("late_image") else 0.0
+        late = self._late if self._happens("late_image") else 0.0
         self._queue.append((done + late, image))
 
     def _expose(self, exposure: float) -> Image:
@@ -138,10 +138,10 @@ class VirtualCamera:
         self._setting = replace(self._setting, boards=boards, spheres=spheres)
         self._link.send(("done", None))
 
-    def _fault(self, name: str, times: int) -> None:
+    def _fault(self, name: str, times: int, late: float) -> None:
         if name == "lost":
             os._exit(1)
-        self._faults[name] = times
+        self._faults[name], self._late = times, late
         self._link.send(("done", None))
 
     def _happens(self, fault: str) -> bool:

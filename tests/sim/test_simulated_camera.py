@@ -15,8 +15,11 @@ from made_scenes import DEMO, over_hole
 
 from cell.core.errors import DeviceError
 from cell.core.geometry import Transform
+from cell.core.kinematics import arm_for
 from cell.sim.bodies import Delivery
 from cell.sim.camera import SimulatedCamera
+from cell.sim.camera_feed import ControllerFeed
+from cell.sim.controller.process import EmulatedController
 
 RING, LASER = 1, 2
 
@@ -112,11 +115,13 @@ def test_a_trigger_while_an_exposure_is_under_way_is_lost(camera):
 
 def test_a_late_image_stays_queued_and_snap_is_not_deceived(camera, controller):
     """The bare device gives the picture before the last for ever; `snap` re-arms."""
+    camera._timeout = 0.4
     camera.set_fault("late_image", 1)
+    camera._timeout = 20.0
     controller.outputs = RING
     camera.fire(0.008)
-    assert camera.fetch(0.05) is None
-    time.sleep(0.5)
+    assert camera.fetch(0.4) is None
+    time.sleep(1.5)
     controller.outputs = 0
     camera.fire(0.008)
     assert np.median(camera.fetch(20.0)) > 60  # asked in the dark, got the light picture
@@ -155,6 +160,21 @@ def test_the_picture_repeats_but_for_its_noise(camera, controller):
     bright = one > 40
     assert np.abs(one - two)[bright].mean() < 0.1 * one[bright].mean()
     assert (one != two).any()
+
+
+def test_it_follows_the_emulated_controller():
+    """Two kinematics written apart agree on where the flange is; the lamps are its outputs."""
+    joints = np.radians([153.0, -93.0, 114.0, -13.0, 59.0, 164.0])
+    with EmulatedController("ur10e", joints=tuple(joints)) as emulator:
+        feed = ControllerFeed(emulator.address, 5.0)
+        feed.open()
+        readings = feed.renew(time.monotonic() + 10.0)
+        feed.close()
+    assert readings[-1].joints == pytest.approx(joints, abs=1e-9)
+    millimetres, angle = readings[-1].base_from_flange.distance(arm_for("ur10e").forward(joints))
+    assert millimetres < 1e-6
+    assert angle < 1e-9
+    assert readings[-1].outputs == 0
 
 
 def test_no_controller_is_said_at_once():

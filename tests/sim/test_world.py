@@ -75,7 +75,7 @@ def test_without_errors_the_world_is_its_design():
 
 @pytest.mark.parametrize(("old", "new", "said"), [
     ("panel: sill,", "panel: still,", "holes on no panel: SI1, SI2, SI3, SI4, SI5"),
-    ("seed: 20261122", "sed: 20261122", "sed"),
+    ("seed: 12", "sed: 12", "sed"),
     ("displacement_mm: 1.0", "displacement_mm: -1.0", "displacement_mm"),
     ("id: SI2", "id: SI1", "two holes have the same id"),
 ])
