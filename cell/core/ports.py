@@ -83,6 +83,9 @@ class Robot(Protocol):
     def stop(self) -> None:
         """Bring the arm to rest, bounded in time. Never raises."""
 
+    def recover(self) -> RobotState:
+        """Come back after a stop whose cause, as a person has confirmed, is gone."""
+
     def close(self) -> None:
         """Stop, release the controller, bounded in time. Idempotent, never raises."""
 
@@ -137,8 +140,8 @@ Refusal: TypeAlias = Literal["", "unknown_type", "no_body", "no_body_id", "not_r
                              "result_held", "nothing_to_do"]
 Fault: TypeAlias = Literal[
     "", "protective_stop", "safeguard_stop", "emergency_stop", "local_mode", "paused", "robot_lost",
-    "camera_lost", "lights_lost", "laser_dark", "disk_full", "recording_failed", "holes_refused",
-    "datum_missing", "master_failed", "results_lost"]
+    "robot_failed", "camera_lost", "lights_lost", "laser_dark", "disk_full", "recording_failed",
+    "results_lost", "holes_refused", "datum_missing", "master_failed"]
 """Why the cell stands; each is a state of the shift and a code on the line."""
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import queue
 import threading
+from typing import cast
 
 from pymodbus.constants import ExcCodes
 from pymodbus.server import ModbusTcpServer
@@ -37,6 +38,14 @@ class ModbusLine:
             self._thread.join()
             raise DeviceError(f"cannot listen on {self._address}:{self._port}: {failure}",
                               device="line")
+
+    @property
+    def endpoint(self) -> tuple[str, int]:
+        """Where the server listens, after `open`; the port is a free one where 0 was asked for."""
+        assert self._server is not None
+        listening = cast(asyncio.Server, self._server.transport)
+        address, port = listening.sockets[0].getsockname()[:2]
+        return str(address), int(port)
 
     def show(self, status: LineStatus) -> None:
         """Say what the cell is doing."""

@@ -80,8 +80,8 @@ REFUSALS: dict[Refusal | Literal["wrong_sequence"], int] = {
     "result_held": 6, "nothing_to_do": 7, "wrong_sequence": 8}
 FAULTS: dict[Fault, int] = {
     "": 0, "protective_stop": 21, "safeguard_stop": 22, "emergency_stop": 23, "local_mode": 24,
-    "paused": 25, "robot_lost": 26, "camera_lost": 31, "lights_lost": 32, "laser_dark": 33,
-    "disk_full": 41, "recording_failed": 42, "results_lost": 43,
+    "paused": 25, "robot_lost": 26, "robot_failed": 27, "camera_lost": 31,
+    "lights_lost": 32, "laser_dark": 33, "disk_full": 41, "recording_failed": 42, "results_lost": 43,
     "holes_refused": 51, "datum_missing": 52, "master_failed": 53}
 
 FROM_PLC_SIZE = max(r.address + r.size for r in FROM_PLC)

@@ -75,14 +75,38 @@ def open_database(where: str | Path) -> Database:
         DocumentError: the URL is wrong, its driver is not installed, or the schema is another one.
         DatabaseError: it does not answer.
     """
-    database = Database(_engine(where if isinstance(where, str) else f"sqlite:///{where}"))
+    database = connect(where)
     try:
         with database.transaction() as connection:
-            _check_schema(connection, str(database))
+            prepare(connection, str(database))
     except CellError:
         database.close()
         raise
     return database
+
+
+def connect(where: str | Path) -> Database:
+    """Name a database without reaching for it: the first transaction does, and may fail.
+
+    Raises:
+        DocumentError: the URL is wrong, or its driver is not installed.
+    """
+    return Database(_engine(where if isinstance(where, str) else f"sqlite:///{where}"))
+
+
+def prepare(connection: Connection, source: str) -> None:
+    """Create the tables where there are none, and refuse another schema.
+
+    Raises:
+        DocumentError: the schema is another one.
+    """
+    if not inspect(connection).has_table(meta.name):
+        metadata.create_all(connection)
+        connection.execute(insert(meta).values(schema=SCHEMA))
+    found = connection.execute(select(meta.c.schema)).scalar_one()
+    if found != SCHEMA:
+        raise DocumentError(f"has schema {found}, this program writes {SCHEMA}: open a new "
+                            "database and run `cell results rebuild`", source=source)
 
 
 def recreate_results(connection: Connection) -> None:
@@ -112,16 +136,6 @@ def _prepare_sqlite(connection: Any, _record: object) -> None:  # noqa: ANN401  
     """Let readers read while one writes, and let a commit survive a power failure."""
     for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON"):
         connection.execute(f"PRAGMA {pragma}")
-
-
-def _check_schema(connection: Connection, source: str) -> None:
-    if not inspect(connection).has_table(meta.name):
-        metadata.create_all(connection)
-        connection.execute(insert(meta).values(schema=SCHEMA))
-    found = connection.execute(select(meta.c.schema)).scalar_one()
-    if found != SCHEMA:
-        raise DocumentError(f"has schema {found}, this program writes {SCHEMA}: open a new "
-                            "database and run `cell results rebuild`", source=source)
 
 
 def _first_line(error: SQLAlchemyError) -> str:

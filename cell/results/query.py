@@ -58,6 +58,14 @@ def show_body(database: Database, name: str) -> tuple[Row, list[Row]] | None:
         return dict(body), [dict(row) for row in rows]
 
 
+def find_recording(database: Database, recording_id: str) -> Row | None:
+    """Find the body of a recording."""
+    with database.transaction() as connection:
+        found = connection.execute(select(bodies).where(bodies.c.recording_id == recording_id))
+        row = found.mappings().first()
+        return dict(row) if row else None
+
+
 def trend(database: Database, feature: str, axis: str, wanted: Filter) -> list[Point]:
     """Follow one axis of one feature over the bodies, the earliest first."""
     query = (select(bodies.c.body_id, bodies.c.started, axes.c.deviation, axes.c.uncertainty,

@@ -13,6 +13,7 @@ from typing import TypeAlias
 
 from sqlalchemy import Connection
 
+from cell.core.errors import CellError
 from cell.results.database import Database, DatabaseError
 
 Write: TypeAlias = Callable[[Connection], None]
@@ -46,7 +47,8 @@ class Writer:
 
         The database is left open. Idempotent.
         """
-        self._writes.put(None)
+        if self._thread.is_alive():
+            self._writes.put(None)
         self._thread.join(timeout)
         self._stopping.set()
         self._thread.join(self._retry + timeout)
@@ -64,9 +66,9 @@ class Writer:
         try:
             with self._database.transaction() as connection:
                 write(connection)
-        except DatabaseError as error:
+        except CellError as error:
             self.trouble = str(error)
-            if error.passing:
+            if isinstance(error, DatabaseError) and error.passing:
                 return False
             self.refused.append(str(error))
         else:

@@ -17,6 +17,8 @@ ADVICE: dict[Fault, str] = {
                   "reset.",
     "paused": "The robot's program is paused on the pendant. Stop or resume it there, then reset.",
     "robot_lost": "No connection to the robot. Check its power and network, then reset.",
+    "robot_failed": "The robot could not do as told. Read the reason; where the way is not "
+                    "free jog it home by hand; then reset.",
     "camera_lost": "No image from the camera. Check its cable and power, then reset.",
     "lights_lost": "The lights do not follow. Check the outputs and their fuse, then reset.",
     "laser_dark": "Several holes without a laser stripe: check that the laser burns and its window "
@@ -36,8 +38,7 @@ ADVICE: dict[Fault, str] = {
 STOPPED: dict[str, Fault] = {
     "protective_stop": "protective_stop", "safeguard_stop": "safeguard_stop",
     "emergency_stop": "emergency_stop", "local_mode": "local_mode", "paused": "paused"}
-DEVICES: dict[str, Fault] = {
-    "camera": "camera_lost", "lights": "lights_lost", "robot": "robot_lost"}
+DEVICES: dict[str, Fault] = {"camera": "camera_lost", "lights": "lights_lost"}
 
 
 class HolesRefusedError(DeviceError):
@@ -55,7 +56,8 @@ def fault_of(error: CellError) -> Fault:
     if isinstance(error, RobotStoppedError):
         return STOPPED.get(error.state, "robot_lost")
     if isinstance(error, DeviceError):
-        return DEVICES.get(error.device or "", "robot_lost")
+        named = [fault for device, fault in DEVICES.items() if device in (error.device or "")]
+        return named[0] if named else "robot_failed"
     if isinstance(error, RecordingError):
         return "disk_full" if _out_of_space(error) else "recording_failed"
     return "results_lost"

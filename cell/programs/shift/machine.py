@@ -77,6 +77,7 @@ class Shift:
 
     def _idle(self) -> None:
         master = self._desk.document.master
+        self._desk.update(trouble=self._measuring.trouble)
         if self._desk.bypass is not None:
             self._desk.update(state="bypass", instruction="Bodies pass unmeasured.")
         elif self._master_due and master is not None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from cell.core.documents.record import Stop
 from cell.core.documents.result import BodyResult
 from cell.core.errors import CellError, DeviceError, RecordingError
+from cell.programs.shift.books import Books
 from cell.programs.shift.desk import Desk
 from cell.programs.shift.faults import fault_of
 from cell.programs.shift.standing import stand
@@ -16,7 +17,6 @@ from cell.programs.shift.takt import TaktGuard
 from cell.programs.shift.watch import BodyWatch
 from cell.programs.shift.work import Begun, Cell, PreparedJob
 from cell.results.booking import Booking, Row, body_rows, book
-from cell.results.writer import Writer
 
 
 class BodyAbortedError(Exception):
@@ -34,7 +34,7 @@ class Outcome:
 class Measuring:
     """Measures the bodies of a shift, one at a time."""
 
-    def __init__(self, desk: Desk, cell: Cell, books: Writer) -> None:
+    def __init__(self, desk: Desk, cell: Cell, books: Books) -> None:
         self._desk, self._cell, self._books = desk, cell, books
         self._guard = TaktGuard(desk.document.takt) if desk.document.takt else None
         self._begun: Begun | None = None
@@ -56,6 +56,11 @@ class Measuring:
             return visit, Outcome(None, "its recording could not be written")
         self._book(job, self._begun, stop)
         return visit, Outcome(stop.result, stop.reason)
+
+    @property
+    def trouble(self) -> str:
+        """What is wrong with the books at the moment, or nothing."""
+        return self._books.trouble
 
     def leave(self, visit: Row) -> None:
         """Drive the arm out of the body's way, however often it takes."""
@@ -86,7 +91,7 @@ class Measuring:
                 watch.check(inspection.records)
                 return inspection.finish("complete", watch.remark)
             except BodyAbortedError as aborted:
-                return inspection.abandon("aborted", str(aborted))
+                return inspection.finish("aborted", str(aborted))  # between holes it stands
             except KeyboardInterrupt:
                 self._desk.stopping = True
                 return inspection.abandon("interrupted", "stopped by a person")

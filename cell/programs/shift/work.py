@@ -60,8 +60,13 @@ class Begun:
 class Cell(Protocol):
     """A cell with its devices open and the jobs of the shift prepared."""
 
-    name: str
-    jobs: Mapping[str, PreparedJob]
+    @property
+    def name(self) -> str:
+        """The cell's name."""
+
+    @property
+    def jobs(self) -> Mapping[str, PreparedJob]:
+        """The jobs by the names that the shift's file has for them."""
 
     def begin(self, job: PreparedJob, body_id: str, *, trial: bool) -> Begun:
         """Open the recording of a body. Raises `DocumentError` or `RecordingError`."""
