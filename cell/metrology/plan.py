@@ -51,7 +51,7 @@ class Plan:
 
     stops: tuple[PlannedStop, ...]
     passages: tuple[Passage, ...]
-    refusals: tuple[tuple[str, str], ...]  # (hole, reason)
+    refusals: tuple[tuple[str, str], ...]  # (hole or `home`, reason)
 
 
 def plan_stops(job: JobDocument, holes: Sequence[Hole], calibration: Calibration,
@@ -90,8 +90,7 @@ def draw_plan(job: JobDocument, holes: Sequence[Hole], calibration: Calibration,
             refusals.append((stop.hole, str(refused)))
     passages = tuple(check_leg(leg, station.limits, arm)
                      for leg in walk(stops, draughtsman.home))
-    refusals += [(passage.leg.end, f"on the way from {passage.leg.start}: {problem}")
-                 for passage in passages for problem in passage.problems]
+    refusals += _obstructed(passages)
     return Plan(tuple(stops), passages, tuple(refusals))
 
 
@@ -102,10 +101,21 @@ def walk(stops: Sequence[PlannedStop], home: Joints) -> Iterator[Leg]:
         name = stop.hole.id
         at_approach = (f"{name} approach", stop.approach)
         via = [(f"{name} via {index + 1}", joints) for index, joints in enumerate(stop.via)]
-        yield from join_legs([here, *via, at_approach])
-        yield from join_legs([at_approach, (name, stop.joints), at_approach], slow=True)
+        yield from join_legs(name, [here, *via, at_approach])
+        yield from join_legs(name, [at_approach, (name, stop.joints), at_approach], slow=True)
         here = at_approach
-    yield from join_legs([here, ("home", home)])
+    yield from join_legs("home", [here, ("home", home)])
+
+
+def _obstructed(passages: Sequence[Passage]) -> Iterator[tuple[str, str]]:
+    """Say once a stop where its way is not free: what follows mostly repeats it."""
+    told = set()
+    for passage in passages:
+        leg = passage.leg
+        if passage.problems and leg.stop not in told:
+            told.add(leg.stop)
+            yield leg.stop, f"on the way from {leg.start} to {leg.end}: " \
+                            + "; ".join(passage.problems)
 
 
 class _RefusedError(Exception):

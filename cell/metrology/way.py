@@ -29,12 +29,15 @@ CLEARANCE = 25.0  # mm to every box: half a cell's diagonal (17), and half a ste
 
 @dataclass(frozen=True)
 class Leg:
-    """One joint move, between two named places; `slow` at approach speed."""
+    """One joint move, between two named places; `slow` at approach speed. `stop` is the hole for
+    whose sake it is driven.
+    """
 
     start: str
     end: str
     joints: tuple[Joints, Joints]
     slow: bool = False
+    stop: str = ""
 
     @property
     def turn(self) -> float:
@@ -152,7 +155,8 @@ def _outside(points: Array, workspace: Box) -> Iterator[str]:
                    f"{workspace.max[index]:g}")
 
 
-def join_legs(places: Sequence[tuple[str, Joints]], *, slow: bool = False) -> Iterator[Leg]:
+def join_legs(stop: str, places: Sequence[tuple[str, Joints]], *,
+              slow: bool = False) -> Iterator[Leg]:
     """Join named places, in order, by joint moves."""
     for (start, first), (end, second) in pairwise(places):
-        yield Leg(start, end, (first, second), slow)
+        yield Leg(start, end, (first, second), slow, stop)

@@ -71,10 +71,8 @@ def check_job(job: Path, cell: str | None = None, logs: Path = Path("logs")) -> 
 
 
 def _check_stop(stop: PlannedStop, plan: Plan, station: StationDocument) -> CheckedStop:
-    """Gather the passages that lead to a stop: by its via points, its approach, and in."""
-    name = stop.hole.id
-    on_the_way = [passage for passage in plan.passages
-                  if passage.leg.end == name or passage.leg.end.startswith(f"{name} ")]
+    """Gather the passages that are driven for a stop: there, in, and out again."""
+    on_the_way = [passage for passage in plan.passages if passage.leg.stop == stop.hole.id]
     nearest = min(on_the_way, key=lambda passage: passage.clearance)
     joints = np.degrees(stop.joints)
     room = [min(angle - low, high - angle)

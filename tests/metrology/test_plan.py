@@ -165,8 +165,8 @@ def test_an_obstacle_between_two_stops_is_met(papers):
     post = Box(name="post", min=tuple(corner - 8.0), max=tuple(corner + 8.0))
     blocked = changed(papers, keep_out=(*papers.station.limits.keep_out, post))
     message = refusal(blocked)
-    assert f"stop {stops[13].hole.id} approach" in message
-    assert f"on the way from {stops[12].hole.id} approach" in message
+    here, there = stops[12].hole.id, stops[13].hole.id
+    assert f"stop {there}: on the way from {here} approach to {there} approach" in message
     assert "'post'" in message
 
 

@@ -18,16 +18,22 @@ MOST = 5  # faults named in one message
 def complain(error: ValidationError, model: type[BaseModel], value: object,
              lines: Mapping[Path, int], source: str) -> DocumentError:
     """Turn what pydantic found into one error for people; `lines` says where each path stands."""
-    faults: dict[tuple[int, str], str] = {}
+    faults: dict[str, str] = {}
     for fault in error.errors(include_url=False):
         path = _known(fault["loc"], lines)
-        where = (lines.get(path, 1), _spell(path))
-        faults.setdefault(where, _sentence(fault, model, value, path))
+        faults.setdefault(name_place(path, lines), _sentence(fault, model, value, path))
     (first, sentence), *others = list(faults.items())
-    more = "".join(f"; also {_place(*where)}: {what}" for where, what in others[:MOST - 1])
+    more = "".join(f"; also {where}: {what}" for where, what in others[:MOST - 1])
     unnamed = len(others) - (MOST - 1)
     more += f"; and {unnamed} more" if unnamed > 0 else ""
-    return DocumentError(sentence + more, source=source, place=_place(*first))
+    return DocumentError(sentence + more, source=source, place=first)
+
+
+def name_place(path: Path, lines: Mapping[Path, int]) -> str:
+    """Name a path and its line: `line 7, stops[2].hole`."""
+    key = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path).strip(".")
+    line = f"line {lines.get(_known(path, lines), 1)}"
+    return f"{line}, {key}" if key else line
 
 
 def _known(location: Path, lines: Mapping[Path, int]) -> Path:
@@ -38,14 +44,6 @@ def _known(location: Path, lines: Mapping[Path, int]) -> Path:
             break
         path = (*path, step)
     return path
-
-
-def _spell(path: Path) -> str:
-    return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path).strip(".")
-
-
-def _place(line: int, key: str) -> str:
-    return f"line {line}, {key}" if key else f"line {line}"
 
 
 def _sentence(fault: Mapping[str, Any], model: type[BaseModel], value: object, path: Path) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 
@@ -19,13 +20,18 @@ from cell.core.documents.calibration import (
     RobotRecord,
     SensorDocument,
 )
+from cell.core.documents.complaint import name_place
 from cell.core.documents.job import JobDocument
 from cell.core.documents.nominals import Hole
 from cell.core.documents.offsets import OffsetsDocument
 from cell.core.documents.station import StationDocument
+from cell.core.documents.strict_yaml import Path, read_tree
 from cell.core.documents.text import parse, read_nominals
 from cell.core.errors import DocumentError
 from cell.core.ports import RobotIdentity
+
+Contradiction: TypeAlias = tuple[str, Path, str]
+"""Which document, where in it, and what is wrong."""
 
 NEEDED = ("job", "nominals", "cell", "sensor", "hand_eye", "body")
 TCP_TOLERANCE = 1e-3  # mm, and rad: what a controller's rounding costs
@@ -63,8 +69,9 @@ class Papers:
         if missing:
             raise DocumentError(f"missing: {', '.join(missing)}", source="papers")
         papers = _parse(texts, set_id, where)
-        for name, place, problem in _contradictions(papers):
-            raise DocumentError(problem, source=where[name], place=place)
+        for name, path, problem in _contradictions(papers):
+            lines = read_tree(texts[name], where[name])[1]
+            raise DocumentError(problem, source=where[name], place=name_place(path, lines))
         return papers
 
     def hole(self, hole_id: str) -> Hole:
@@ -94,18 +101,18 @@ def _parse(texts: Mapping[str, str], set_id: str, where: Mapping[str, str]) -> P
                   read(OffsetsDocument, "offsets"), where)
 
 
-def _contradictions(papers: Papers) -> Iterator[tuple[str, str, str]]:
-    """Find what each document alone cannot know: (document, place, problem)."""
+def _contradictions(papers: Papers) -> Iterator[Contradiction]:
+    """Find what each document alone cannot know."""
     yield from _job_against_nominals(papers)
     yield from _alignment(papers)
     yield from _set_against_cell(papers)
     yield from _offsets_against_nominals(papers)
 
 
-def _job_against_nominals(papers: Papers) -> Iterator[tuple[str, str, str]]:
+def _job_against_nominals(papers: Papers) -> Iterator[Contradiction]:
     known, seen = {hole.id for hole in papers.holes}, set()
     for index, stop in enumerate(papers.job.stops):
-        place = f"stops[{index}].hole"
+        place = ("stops", index, "hole")
         if stop.hole not in known:
             yield "job", place, _unknown_hole(stop.hole, papers)
         if stop.hole in seen:
@@ -113,11 +120,11 @@ def _job_against_nominals(papers: Papers) -> Iterator[tuple[str, str, str]]:
         seen.add(stop.hole)
 
 
-def _alignment(papers: Papers) -> Iterator[tuple[str, str, str]]:
+def _alignment(papers: Papers) -> Iterator[Contradiction]:
     alignment, known = papers.job.alignment, {hole.id for hole in papers.holes}
     visited = {stop.hole for stop in papers.job.stops} or known
     for hole_id, axes in alignment.datums.items():
-        place = f"alignment.datums.{hole_id}"
+        place = ("alignment", "datums", hole_id)
         if hole_id not in known:
             yield "job", place, _unknown_hole(hole_id, papers)
         if hole_id not in visited:
@@ -126,40 +133,40 @@ def _alignment(papers: Papers) -> Iterator[tuple[str, str, str]]:
             yield "job", place, f"expected some of the axes xyz, each once; came {axes!r}"
     constraints = sum(map(len, alignment.datums.values()))
     if alignment.method == "rps" and constraints < RPS_CONSTRAINTS:
-        yield ("job", "alignment", f"3-2-1 needs at least {RPS_CONSTRAINTS} constrained axes; "
+        yield ("job", ("alignment",), f"3-2-1 needs at least {RPS_CONSTRAINTS} constrained axes; "
                f"the datums hold {constraints}")
     if alignment.method == "best_fit" and len(alignment.datums) < BEST_FIT_DATUMS:
-        yield ("job", "alignment", f"a best fit needs at least {BEST_FIT_DATUMS} datums; "
+        yield ("job", ("alignment",), f"a best fit needs at least {BEST_FIT_DATUMS} datums; "
                f"came {len(alignment.datums)}")
 
 
-def _set_against_cell(papers: Papers) -> Iterator[tuple[str, str, str]]:
+def _set_against_cell(papers: Papers) -> Iterator[Contradiction]:
     robot, made_with = papers.station.robot, papers.calibration.hand_eye.robot
     sensor, hand_eye = papers.calibration.sensor, papers.calibration.hand_eye
     body, kinematics = papers.calibration.body, papers.calibration.kinematics
     if made_with.model != robot.model:
-        yield ("hand_eye", "robot.model", f"calibrated on a {made_with.model}; the cell has a "
+        yield ("hand_eye", ("robot", "model"), f"calibrated on a {made_with.model}; the cell has a "
                f"{robot.model}")
     if robot.serial is not None and made_with.serial != robot.serial:
-        yield ("hand_eye", "robot.serial", f"calibrated on the robot {made_with.serial}; the "
+        yield ("hand_eye", ("robot", "serial"), f"calibrated on the robot {made_with.serial}; the "
                f"cell's is {robot.serial}")
     if None not in (sensor.serial, hand_eye.sensor_serial) \
             and sensor.serial != hand_eye.sensor_serial:
-        yield ("hand_eye", "sensor_serial", f"calibrated with the sensor "
+        yield ("hand_eye", ("sensor_serial",), f"calibrated with the sensor "
                f"{hand_eye.sensor_serial}; sensor.yaml is of {sensor.serial}")
     if body.calibration_set not in (None, papers.set_id):
-        yield ("body", "calibration_set", f"registered with the set {body.calibration_set}; "
+        yield ("body", ("calibration_set",), f"registered with the set {body.calibration_set}; "
                f"active is {papers.set_id}: register the body again, or go back to that set")
     if kinematics is not None and kinematics.model != robot.model:
-        yield ("kinematics", "model", f"estimated for a {kinematics.model}; the cell has a "
+        yield ("kinematics", ("model",), f"estimated for a {kinematics.model}; the cell has a "
                f"{robot.model}")
 
 
-def _offsets_against_nominals(papers: Papers) -> Iterator[tuple[str, str, str]]:
+def _offsets_against_nominals(papers: Papers) -> Iterator[Contradiction]:
     known = {hole.id for hole in papers.holes}
     for index, offset in enumerate(papers.offsets.offsets if papers.offsets else ()):
         if offset.hole not in known:
-            yield "offsets", f"offsets[{index}].hole", _unknown_hole(offset.hole, papers)
+            yield "offsets", ("offsets", index, "hole"), _unknown_hole(offset.hole, papers)
 
 
 def _unknown_hole(hole_id: str, papers: Papers) -> str:

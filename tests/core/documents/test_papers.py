@@ -31,7 +31,7 @@ def test_the_holes_come_in_the_order_of_the_stops(workplace):
 
 
 @pytest.mark.parametrize(("document", "old", "new", "words"), [
-    ("job", "hole: SI3}", "hole: SI33}", ["stops[5].hole", "'SI33'", "not among the nominals"]),
+    ("job", "hole: SI3}", "hole: SI33}", ["line 12, stops[5].hole", "'SI33'", "not among"]),
     ("job", "hole: SI4}", "hole: SI3}", ["stops[6].hole", "'SI3' has two stops"]),
     ("job", "stops:", "alignment: {datums: {XX: xyz}}\nstops:", ["alignment.datums.XX", "'XX'"]),
     ("job", "stops:", "alignment: {datums: {SI1: xw}}\nstops:", ["alignment.datums.SI1", "'xw'"]),
@@ -39,7 +39,7 @@ def test_the_holes_come_in_the_order_of_the_stops(workplace):
     ("job", "stops:", "alignment: {method: rps, datums: {SI1: xyz}}\nstops:", ["at least 6", "3"]),
     ("job", "stops:", "alignment: {method: best_fit}\nstops:", ["at least 3 datums", "came 0"]),
     ("hand_eye", "model: ur10e", "model: ur5e", ["robot.model", "ur5e", "ur10e"]),
-    ("hand_eye", "20235500417", "20235500999", ["robot.serial", "20235500999", "20235500417"]),
+    ("hand_eye", "20235500417", "20235500999", ["line 9, robot.serial", "20235500999"]),
     ("hand_eye", "LS-0417", "LS-0001", ["sensor_serial", "LS-0001", "LS-0417"]),
     ("body", "calibration_set: ", "calibration_set: x", ["calibration_set", "register the body"]),
 ])
