@@ -14,8 +14,8 @@ def view(
     hole: str | None = typer.Option(None, metavar="ID", help="Open it at this hole."),
     web: bool = typer.Option(False, help="Serve it to a browser on this machine instead of opening "
                                          "a window."),
-    picture: Path | None = typer.Option(None, metavar="PNG", help="Save a picture of it and end; needs no "
-                                                           "screen."),
+    picture: Path | None = typer.Option(None, metavar="PNG", help="Save a picture of it and end; "
+                                                                  "needs no screen."),
 ) -> None:
     """Open a recording in the viewer: images with what was found, the body, deviations, verdicts.
 
