@@ -12,7 +12,7 @@ from cell.core.documents.result import Measured
 from cell.core.geometry import Array, Transform
 
 SHIFT_SIGMA = 1.0  # mm: how far a fixture leaves a body from its place
-TURN_SIGMA = 0.003  # rad
+TURN_SIGMA = 0.0015  # rad, per axis
 HOLE_SIGMA = 0.2  # mm: what holes deviate by of themselves
 HUBER = 2.0
 STEPS = 6
