@@ -25,7 +25,8 @@ LASER = 1 << 5
 STOPS = [("protective_stop", "protective_stop"), ("safeguard on", "safeguard_stop"),
          ("emergency_stop on", "emergency_stop"), ("local_mode on", "local_mode"),
          ("pause", "paused"), ("kill_program", "lost")]
-BREAKS = ["cut", "freeze_stream on", "stall on", "garbage", "half_package"]
+BREAKS = ["cut", "stall on", *(pytest.param(fault, marks=pytest.mark.soak)
+                               for fault in ("freeze_stream on", "garbage", "half_package"))]
 
 
 def interrupt_a_move(robot, lights, cause, goal_from_start=FAR):
@@ -119,7 +120,9 @@ def test_a_safeguard_that_closes_again_does_not_finish_the_old_move(robot, light
     check_safe(truth, goal)
 
 
-@pytest.mark.parametrize("fault", ["cut", "freeze_stream on", "stall on", "kill_program"])
+@pytest.mark.parametrize("fault", [
+    "cut", "kill_program", pytest.param("freeze_stream on", marks=pytest.mark.soak),
+    pytest.param("stall on", marks=pytest.mark.soak)])
 def test_a_fault_at_rest_is_found_by_the_next_request(robot, lights, emulator, truth, fault):
     robot.open()
     lights.set("laser")

@@ -151,6 +151,7 @@ def test_after_a_protective_stop_the_robot_comes_back_in_its_time(robot, emulato
     move_on(robot)
 
 
+@pytest.mark.soak
 def test_after_an_emergency_stop_power_is_brought_back(robot, emulator):
     robot.open()
     emulator.tell_referee("emergency_stop on")
@@ -179,7 +180,8 @@ def test_what_only_a_person_can_cure_is_waited_for(robot, emulator, fault, cure,
     move_on(robot)
 
 
-@pytest.mark.parametrize("fault", ["cut", "pause", "kill_program"])
+@pytest.mark.parametrize("fault", [
+    "cut", *(pytest.param(fault, marks=pytest.mark.soak) for fault in ("pause", "kill_program"))])
 def test_after_a_lost_connection_or_program_the_robot_comes_back(robot, emulator, truth, fault):
     robot.open()
     stands = truth()["joints"]
