@@ -27,7 +27,6 @@ from cell.core.errors import CellError
 from cell.core.observation import Image
 from cell.sim.bodies import Delivery, draw_body
 from cell.sim.camera_feed import ControllerFeed
-from cell.sim.materials import pattern
 from cell.sim.render import Setting, render
 from cell.sim.render_lens import Lens
 from cell.sim.render_light import Lamps
@@ -65,8 +64,6 @@ class VirtualCamera:
         self._feed.open()
         self._follow(self._feed.renew(time.monotonic() + CONNECT_SECONDS))
         self._lens.prepare()
-        for panel in self._world.scene.panels:
-            pattern(panel.finish)
         self._link.send(("ready", self._world.sensor.camera.image_size))
 
     def run(self) -> None:

@@ -11,6 +11,7 @@ from functools import lru_cache
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy import fft
 
 TILE = 1024          # texels along each side
 TEXEL_MM = 0.06      # about a pixel at the working distance
@@ -55,15 +56,12 @@ def pattern(finish: str) -> Tile:
 
 def _brushed(chance: np.random.Generator) -> Tile:
     """Rolled steel: streaks along the rolling direction, of many lengths, on a mottled ground."""
-    streaks = sum(strength * _noise(chance, along, across)
-                  for along, across, strength in ((90, 0.7, 0.09), (30, 0.9, 0.06), (8, 1.2, 0.04)))
-    return 1.0 + streaks + 0.08 * _noise(chance, 40, 40)
+    return 1.0 + _noise(chance, (90, 0.7, 0.09), (30, 0.9, 0.06), (8, 1.2, 0.04), (40, 40, 0.08))
 
 
 def _painted(chance: np.random.Generator) -> Tile:
-    """Paint: a faint orange peel and a fainter cloud."""
-    return 1.0 + 0.02 * _noise(chance, 6, 6) + 0.03 * _noise(chance, 40, 40) \
-        + 0.012 * _noise(chance, 1, 1)
+    """Paint: a faint orange peel, a fainter cloud, grains."""
+    return 1.0 + _noise(chance, (6, 6, 0.02), (40, 40, 0.03), (1, 1, 0.012))
 
 
 def _even(chance: np.random.Generator) -> Tile:  # noqa: ARG001  ceramic has no pattern
@@ -79,7 +77,7 @@ def _spangled(chance: np.random.Generator) -> Tile:
     rows, columns = np.indices(crystal.shape, dtype=np.float32)
     phase = pitch[crystal] * (np.cos(angle)[crystal] * columns + np.sin(angle)[crystal] * rows)
     ribs = 0.05 * np.sin(phase) * (chance.uniform(0, 1, count) > 0.5)[crystal]
-    tile = (level[crystal] + ribs + 0.03 * _noise(chance, 1, 1)).astype(np.float32)
+    tile = (level[crystal] + ribs + _noise(chance, (1, 1, 0.03))).astype(np.float32)
     return cv2.GaussianBlur(tile, (0, 0), 0.6)
 
 
@@ -100,10 +98,16 @@ def _crystals(chance: np.random.Generator) -> NDArray[np.int32]:
     return number[labels[half:half + TILE, half:half + TILE]]
 
 
-def _noise(chance: np.random.Generator, along: float, across: float) -> Tile:
-    """Return noise of unit variance, smooth over `along` columns and `across` rows, periodic."""
-    white = np.fft.rfft2(chance.standard_normal((TILE, TILE), dtype=np.float32))
-    down = np.fft.fftfreq(TILE)[:, None] * across
-    right = np.fft.rfftfreq(TILE)[None, :] * along
-    tile = np.fft.irfft2(white * np.exp(-2.0 * np.pi**2 * (down**2 + right**2)))
-    return (tile / tile.std()).astype(np.float32)
+def _noise(chance: np.random.Generator, *parts: tuple[float, float, float]) -> Tile:
+    """Return periodic noise whose power is the sum of its parts'.
+
+    A part is smooth over `along` columns and `across` rows (texels) and has its own standard
+    deviation.
+    """
+    down, right = np.fft.fftfreq(TILE)[:, None], np.fft.rfftfreq(TILE)[None, :]
+    power = np.zeros((TILE, TILE // 2 + 1), np.float32)
+    for along, across, deviation in parts:
+        bell = np.exp(-4.0 * np.pi**2 * ((across * down) ** 2 + (along * right) ** 2))
+        power += deviation**2 * bell / bell.mean()
+    white = fft.rfft2(chance.standard_normal((TILE, TILE), dtype=np.float32))
+    return fft.irfft2(white * np.sqrt(power)).astype(np.float32)
