@@ -3,14 +3,27 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
-from cell.core.documents.base import Document, Vector2, Vector3, Vector6
+from cell.core.documents.base import Document, Number, Vector2, Vector3, Vector6
 
 Positive = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, strict=True, allow_inf_nan=False)]
+# Upper bounds find a wrong unit: degrees a second, milliseconds.
+Speed = Annotated[Number, Field(gt=0, le=3.2)]
+Acceleration = Annotated[Number, Field(gt=0, le=40)]
+Exposure = Annotated[Number, Field(gt=0, le=2)]
+
+
+def _ascending(pair: Vector2) -> Vector2:
+    if not pair[0] < pair[1]:
+        raise ValueError("expected the lower limit before the upper one")
+    return pair
+
+
+Range = Annotated[Vector2, AfterValidator(_ascending)]
 
 
 class RobotSettings(Document):
@@ -22,15 +35,22 @@ class RobotSettings(Document):
     model: Literal["ur3e", "ur5e", "ur10e", "ur16e", "ur20", "ur30"]
     address: str | None = None
     serial: str | None = None
-    speed_rad_per_s: Positive = 1.0
-    acceleration_rad_per_s2: Positive = 2.0
-    approach_speed_rad_per_s: Positive = 0.3
+    speed_rad_per_s: Speed = 1.0
+    acceleration_rad_per_s2: Acceleration = 2.0
+    approach_speed_rad_per_s: Speed = 0.3
     settle_s: NotNegative = 0.2
     arrival_mm: Positive = 0.1
     arrival_deg: Positive = 0.02
     digital_output_ring: Annotated[int, Field(ge=0, le=15)] = 0
     digital_output_laser: Annotated[int, Field(ge=0, le=15)] = 1
     light_rise_s: NotNegative = 0.02
+
+    @model_validator(mode="after")
+    def _can_be_wired(self) -> Self:
+        if self.digital_output_ring == self.digital_output_laser:
+            raise ValueError("ring light and laser need an output each; both have "
+                             f"{self.digital_output_ring}")
+        return self
 
 
 class CameraSettings(Document):
@@ -42,10 +62,17 @@ class CameraSettings(Document):
     driver: Literal["sim", "video"]
     source: str | int | None = None
     scene: str | None = None
-    exposure_ring_s: Positive = 0.008
-    exposure_laser_s: Positive = 0.004
+    exposure_ring_s: Exposure = 0.008
+    exposure_laser_s: Exposure = 0.004
     timeout_s: Positive = 2.0
     stale_s: NotNegative = 0.3
+
+    @model_validator(mode="after")
+    def _can_be_found(self) -> Self:
+        needed = "scene" if self.driver == "sim" else "source"
+        if getattr(self, needed) is None:
+            raise ValueError(f"a camera with `driver: {self.driver}` needs its `{needed}`")
+        return self
 
 
 class Box(Document):
@@ -55,6 +82,13 @@ class Box(Document):
     min: Vector3
     max: Vector3
 
+    @field_validator("max")
+    @classmethod
+    def _is_beyond(cls, far: Vector3, info: ValidationInfo) -> Vector3:
+        if not all(low < high for low, high in zip(info.data.get("min", far), far, strict=True)):
+            raise ValueError("expected every coordinate of `max` above that of `min`")
+        return far
+
 
 class Limits(Document):
     """Where the cell may go. Joint limits are narrower than the arm's (cables); lengths in mm, in
@@ -62,7 +96,7 @@ class Limits(Document):
     inside `workspace` and outside every keep-out box.
     """
 
-    joints_deg: tuple[Vector2, Vector2, Vector2, Vector2, Vector2, Vector2]
+    joints_deg: tuple[Range, Range, Range, Range, Range, Range]
     workspace: Box
     keep_out: tuple[Box, ...] = ()
     sensor_points: tuple[Vector3, ...] = ()
@@ -82,6 +116,24 @@ class StationDocument(Document):
     approach_mm: NotNegative = 20.0
     still_mm: Positive = 0.02
     still_deg: Positive = 0.01
+
+    @field_validator("robot")
+    @classmethod
+    def _can_be_reached(cls, robot: RobotSettings) -> RobotSettings:
+        if robot.driver == "ur" and robot.address is None:
+            raise ValueError("a robot with `driver: ur` needs its `address`")
+        return robot
+
+    @field_validator("home_deg")
+    @classmethod
+    def _is_within_the_limits(cls, home: Vector6, info: ValidationInfo) -> Vector6:
+        limits = info.data.get("limits")
+        for joint, (angle, (low, high)) in enumerate(
+                zip(home, limits.joints_deg if limits else (), strict=limits is not None)):
+            if not low <= angle <= high:
+                raise ValueError(f"joint {joint + 1} of home is at {angle:g}, outside of its "
+                                 f"limits {low:g} to {high:g}")
+        return home
 
     @property
     def still_rad(self) -> float:
