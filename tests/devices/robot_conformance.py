@@ -89,6 +89,13 @@ class RobotConformance:
             opened.move_to(moves(start + SMALL))
         assert opened.state().joints == pytest.approx(start, abs=1e-3)
 
+    def test_after_a_stop_it_recovers_where_it_stands_and_moves_again(self, opened):
+        start = np.array(opened.state().joints)
+        opened.stop()
+        assert opened.recover().joints == pytest.approx(start, abs=1e-3)
+        reached = opened.move_to(moves(start + SMALL))
+        assert reached.joints == pytest.approx(start + SMALL, abs=1e-3)
+
     def test_closing_is_idempotent_and_ends_everything(self, opened):
         opened.close()
         opened.close()
