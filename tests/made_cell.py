@@ -11,15 +11,18 @@ from pathlib import Path
 
 import numpy as np
 
+from cell.archive.papers import read_papers
 from cell.core.documents.job import Decision
 from cell.core.documents.nominals import Hole
 from cell.core.documents.record import Attempt, HoleRecord, Start, Stop
 from cell.core.documents.result import BodyResult, Feature, Located, Measured, NotMeasured
 from cell.core.geometry import Transform
 from cell.core.observation import Observation, View
-from cell.metrology.decide import judge_axis
+from cell.metrology.decide import judge_axis, judge_run
+from cell.programs.approve import approval_hashes
 from cell.programs.shift.work import Begun, PreparedJob
 from cell.recording import Recorder
+from cell.recording.seal import read_seal, seal_path
 
 HOLES = 6
 TEXTS = {"job": "recorded", "nominals": "recorded", "cell": "recorded", "sensor": "recorded",
@@ -30,6 +33,17 @@ def made_hole(number: int, importance: str = "") -> Hole:
     return Hole(f"H{number}", np.array([100.0 * number, -500.0, 40.0]), np.array([0.0, -1.0, 0.0]),
                 10.0, 1.0, "camera", frozenset("xyd"), tolerance={"x": 0.5, "y": 0.5, "d": 0.2},
                 importance=importance)
+
+
+def demo_papers():
+    """The papers of the demo job: what a recording needs to be judged again."""
+    here = Path(__file__).parents[1]
+    return read_papers(here / "jobs" / "demo.yaml", calibration=here / "calibration").parse()
+
+
+def demo_job(papers):
+    return PreparedJob(papers.job.name, papers.planned_holes, frozenset(),
+                       approval_hashes(papers.texts))
 
 
 def made_job(name="demo", holes=HOLES, datums=(), importance=lambda n: "") -> PreparedJob:
@@ -47,8 +61,10 @@ class RecordedCell:
     name = "recorded"
 
     def __init__(self, jobs, folder: Path | None = None, deviation=lambda body, hole: 0.05,
-                 plant=lambda body, hole: None):
-        self.jobs, self.folder = jobs, folder
+                 plant=lambda body, hole: None, papers=None):
+        self.jobs, self.folder, self.papers = jobs, folder, papers
+        if papers:
+            self.name = papers.station.name
         self.deviation, self.plant = deviation, plant
         self.bodies = itertools.count(1)
         self.safe = self.recovered = self.homes = 0
@@ -56,10 +72,16 @@ class RecordedCell:
 
     def begin(self, job, body_id, *, trial):
         recording_id = f"{job.name}_{secrets.token_hex(6)}"
-        start = Start(recording_id, body_id, time.time(), "set-1", TEXTS, {}, {}, trial=trial)
+        texts, set_id = (self.papers.texts, self.papers.set_id) if self.papers else (TEXTS, "set-1")
+        start = Start(recording_id, body_id, time.time(), set_id, texts, {}, {}, trial=trial)
         recorder = Recorder(self.folder / f"{recording_id}.rrd", start) if self.folder else None
-        inspection = RecordedInspection(self, job, recorder, next(self.bodies))
-        return Begun(start, inspection, lambda: "seal")
+        inspection = RecordedInspection(self, job, start, recorder, next(self.bodies))
+        return Begun(start, inspection, lambda: self._chain(recording_id))
+
+    def _chain(self, recording_id):
+        if self.folder is None:
+            return ""
+        return read_seal(seal_path(self.folder / f"{recording_id}.rrd")).chain
 
     def make_safe(self):
         self.safe += 1
@@ -73,12 +95,14 @@ class RecordedCell:
 class RecordedInspection:
     """One body of a `RecordedCell`."""
 
-    def __init__(self, cell, job, recorder, number):
-        self.cell, self.job, self.recorder, self.number = cell, job, recorder, number
-        self.records = []
+    def __init__(self, cell, job, start, recorder, number):
+        self.cell, self.job, self.start = cell, job, start
+        self.recorder, self.number, self.records = recorder, number, []
 
     @property
     def result(self):
+        if self.cell.papers:
+            return judge_run(self.cell.papers, self.start, self.records)
         return judge_recorded(self.job, [record.outcome for record in self.records])
 
     def measure_remaining(self, wanted):
@@ -122,7 +146,7 @@ def made_outcome(hole, found):
         return NotMeasured(hole.id, found, "as it was recorded")
     located = Located("joint", np.zeros(3), 5.0, None, 1e-4 * np.eye(4))
     centre = hole.centre + np.array([found, 0.1 * found, 0.0])
-    return Measured(hole.id, centre, 10.0, 1e-4 * np.eye(4), None, located, located, 0)
+    return Measured(hole.id, centre, hole.diameter, 1e-4 * np.eye(4), None, located, located, 0)
 
 
 def judge_recorded(job, outcomes):
