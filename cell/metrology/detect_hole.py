@@ -17,7 +17,13 @@ from cell.metrology.edges import Edges, find_edges
 from cell.metrology.ellipse import Ellipse
 from cell.metrology.features import Expected, Rim
 from cell.metrology.find_holes import Hole, find_holes
-from cell.metrology.gates import check_inside, check_whole
+from cell.metrology.gates import (
+    check_clear,
+    check_inside,
+    check_lit,
+    check_round,
+    check_whole,
+)
 from cell.metrology.profile import Profile, fit_profile, locate_edges
 from cell.metrology.reasons import refusal
 from cell.metrology.rim_fit import agree, settle
@@ -29,7 +35,7 @@ OUTWARD = 3.0          # px of sheet in a grey profile: more would add its textu
 INWARD = 3.0           # px of hole beyond the wall
 MANY = 0.87            # profiles an edge, below which two rims may show
 ROUGH_SPACING, SPACING = 3.0, 1.5  # px along the rim
-SHARP = 0.9            # px of blur by the lens, above which the edge itself may be rounded
+SHARP = 1.0            # px of blur by the lens, above which the edge itself may be rounded
 SMALL_ROUGHNESS = 0.25  # px from end to end, which texture alone gives
 
 
@@ -39,6 +45,7 @@ def detect_hole(image: Image, camera: CameraModel, expected: Expected) -> Rim:
     Raises:
         UnmeasurableError: there is none, or it is cut by the border, covered or not round.
     """
+    check_lit(image)
     holes = list(find_holes(image, camera, expected))
     if not holes:
         raise refusal("no_hole")
@@ -61,7 +68,9 @@ def detect_rim(image: Image, hole: Hole, camera: CameraModel, expected: Expected
     band = _profiles(hole.patch, rough, max(wall.widest for wall in walls))
     rays = np.repeat(seen, -(-len(band.t) // len(seen)))[:len(band.t)]
     profile = fit_profile(band, rays, walls)
-    edge, misfit = locate_edges(band, profile)
+    edge, height, misfit = locate_edges(band, profile)
+    step = abs(float(np.median(height[rays])))
+    check_clear(step, float(np.median(misfit[rays])), profile.blur)
     good = rays & (misfit < 3.0 * np.median(misfit[rays])) & (np.abs(edge - profile.edge) < 2.0)
     return _rim(band, edge, good, profile, hole)
 
@@ -92,6 +101,7 @@ def _rays(rim: Ellipse, spacing: float) -> int:
 def _rim(band: Band, edge: Array, good: Mask, profile: Profile, hole: Hole) -> Rim:
     ray = np.nonzero(good)[0]
     ellipse, miss, scale = settle(band, Edges(ray, edge[ray], edge[ray]), floor=0.01)
+    check_round(ellipse, scale)
     kept = np.abs(miss) < 3.5 * scale
     normals = band.ellipse.normals(band.t[ray])
     # A blurred disc looks smaller: its half level lies s**2 / 2R inside.
@@ -111,7 +121,7 @@ def _ambiguity(ripple: Array, profile: Profile) -> float:
     """
     low, high = np.quantile(ripple, [0.025, 0.975])
     soft = np.sqrt(max(profile.blur**2 - SMOOTHING**2, 0.0)) - SHARP
-    return float(max(high - low - SMALL_ROUGHNESS, 0.0) + 3.0 * max(soft, 0.0)
+    return float(max(high - low - SMALL_ROUGHNESS, 0.0) + np.clip(3.0 * soft, 0.0, 1.5)
                  + np.abs(profile.wall_pull).max() / 2.0)
 
 

@@ -13,7 +13,7 @@ from cell.metrology.detect_hole import detect_rim
 from cell.metrology.detect_stripe import crosses, falls_into, follow_stripe
 from cell.metrology.features import Expected, Rim, Stripe
 from cell.metrology.find_holes import Hole, find_holes
-from cell.metrology.gates import COMPLETE
+from cell.metrology.gates import COMPLETE, check_lit, why_no_hole
 from cell.metrology.reasons import refusal
 from cell.metrology.ridge import Ridge, find_ridge, runs_upright
 
@@ -34,9 +34,12 @@ def detect_pair(hole_image: Image, stripe_image: Image, sensor: SensorModel,
         raise refusal("images_swapped")
     if ridge is None:
         raise refusal("no_laser")
+    check_lit(hole_image)
     placed = _at_depth(expected, ridge, sensor)
     holes = find_holes(hole_image, sensor.camera, placed)
-    hole = _crossed(holes, ridge)
+    hole, seen = _crossed(holes, ridge)
+    if hole is None:
+        raise refusal("laser_misses_hole" if seen else why_no_hole(hole_image, ridge))
     rim = detect_rim(hole_image, hole, sensor.camera, placed)
     return rim, follow_stripe(stripe_image, ridge, rim, sensor, expected)
 
@@ -50,8 +53,10 @@ def _at_depth(expected: Expected, ridge: Ridge, sensor: SensorModel) -> Expected
     return replace(expected, centre=np.median(on_sheet, axis=0), centre_sigma=ANYWHERE)
 
 
-def _crossed(holes: Iterable[Hole], ridge: Ridge) -> Hole:
-    """Choose the hole that the stripe crosses: the first whole one, else the most complete."""
+def _crossed(holes: Iterable[Hole], ridge: Ridge) -> tuple[Hole | None, bool]:
+    """Choose the hole that the stripe crosses: the first whole one, else the most complete. Tells
+    also whether there was a whole one anywhere.
+    """
     crossed: Hole | None = None
     strongest = 0.0  # contrast of the whole holes beside the stripe: an odd arc is much weaker
     for hole in holes:
@@ -61,10 +66,10 @@ def _crossed(holes: Iterable[Hole], ridge: Ridge) -> Hole:
         elif hole.contrast < FAINT * strongest or not falls_into(ridge, hole.ellipse):
             continue
         elif whole:
-            return hole
+            return hole, True
         elif crossed is None or hole.coverage > crossed.coverage:
             crossed = hole
     if crossed is None or crossed.contrast < FAINT * strongest:
-        raise refusal("laser_misses_hole" if strongest else "no_hole")
-    return crossed
+        return None, strongest > 0.0
+    return crossed, True
 

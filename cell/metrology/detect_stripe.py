@@ -20,6 +20,7 @@ DIE_ROLL = 0.7      # mm beside the rim, where a sheet of unknown thickness bend
 LENGTH = 12.0       # mm of stripe used on either side: the sheet is flat as far as that
 HALF_WINDOW = 10    # px across the stripe: four standard deviations of a wide one
 FLOOR = 0.2         # of the stripe's height, below which nothing counts towards its centre
+LARGEST_GAP = 0.4   # px between the two sides, beyond what their noise allows
 LEAST_LINES = 8     # on either side
 DEEP = 0.95         # of the radius, from which on a stripe counts as inside
 LEAST_GAP = 0.3     # of the chord, on which the stripe has to be gone
@@ -60,10 +61,26 @@ def follow_stripe(image: Image, ridge: Ridge, rim: Rim, sensor: SensorModel,
         raise refusal("stripe_too_short")
     miss, scale = _straightness(points, sensor.camera, ridge.upright)
     good = np.abs(miss) < 3.5 * scale
-    step = float(np.median(miss[good & (side > 0)]) - np.median(miss[good & (side < 0)]))
-    return Stripe(points=points[good], side=side[good], sigma=scale,
-                  correlation=correlation_length(miss[good]),
-                  quality={"height": ridge.height, "step": step, "share": ridge.share})
+    sigma, correlation = robust_sigma(miss[good]), correlation_length(miss[good])
+    gap, unsure = _gap(points[good][:, 1 if ridge.upright else 0], miss[good], side[good])
+    if abs(gap) > LARGEST_GAP + 3.5 * unsure:
+        raise refusal("stripe_segments_disagree", f"they are {gap:.1f} px apart")
+    return Stripe(points=points[good], side=side[good], sigma=sigma, correlation=correlation,
+                  quality={"height": ridge.height, "gap_px": gap, "share": ridge.share})
+
+
+def _gap(along: Array, miss: Array, side: Array) -> tuple[float, float]:
+    """Compare the two sides where they would meet: the distance, and its standard deviation."""
+    middle = (along[side < 0].max() + along[side > 0].min()) / 2.0
+    ends, variance = [], 0.0
+    for chosen in (side < 0, side > 0):
+        rows = np.column_stack([np.ones(chosen.sum()), along[chosen] - middle])
+        inverse = np.linalg.inv(rows.T @ rows)
+        line = inverse @ rows.T @ miss[chosen]
+        rest = miss[chosen] - rows @ line
+        ends.append(float(line[0]))
+        variance += float(inverse[0, 0]) * robust_sigma(rest) ** 2 * correlation_length(rest)
+    return ends[1] - ends[0], float(np.sqrt(variance))
 
 
 def crosses(ridge: Ridge, hole: Ellipse) -> bool:
@@ -73,7 +90,8 @@ def crosses(ridge: Ridge, hole: Ellipse) -> bool:
 
 def falls_into(ridge: Ridge, hole: Ellipse) -> bool:
     """Tell whether the stripe leaves the sheet inside an ellipse, as it does over a hole."""
-    return ridge.interrupted(hole.reach(ridge.points(ridge.length)) < DEEP) > LEAST_GAP
+    inside = hole.reach(ridge.points(ridge.length)) < DEEP
+    return bool(inside.any()) and float(ridge.gone[inside].mean()) > LEAST_GAP
 
 
 def _hole(rim: Rim) -> Ellipse:

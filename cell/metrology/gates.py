@@ -15,9 +15,25 @@ from cell.metrology.edges import find_edges
 from cell.metrology.ellipse import Ellipse
 from cell.metrology.find_holes import MARGIN, RAYS, Hole
 from cell.metrology.reasons import Reason, refusal
+from cell.metrology.ridge import Ridge
 
 COMPLETE = 0.75  # of the rim has to be seen
+DARK, WHITE = 20.0, 254  # grey values of 255
+MOSTLY = 0.5     # of the picture
+LEAST_GAP = 16   # px of the stripe, that an opening interrupts
+UNLIKE = 0.3     # of the brighter one, by which opening and sheet differ
+CLEAR = 20.0     # times what the profiles leave unexplained
+TOO_SOFT = 4.0   # px of blur
+FLATTEST = 0.75  # minor over major axis: a tilt of 41 degrees
+RAGGED = 0.03    # of the radius, that edges may scatter
 BESIDE = 0.1     # of the radius, inside and outside the rim, where hole and metal are looked at
+
+
+def check_lit(image: Image) -> None:
+    """Refuse a picture in which even the brightest parts are dark."""
+    brightest = float(np.quantile(image[::4, ::4], 0.99))
+    if brightest < DARK:
+        raise refusal("too_dark", f"99 % of it lies below {brightest:.0f} of 255")
 
 
 def check_inside(image: Image, rim: Ellipse) -> None:
@@ -40,6 +56,25 @@ def check_whole(hole: Hole) -> None:
                       f"{seen.mean():.0%} of the rim follows an ellipse")
 
 
+def check_clear(step: float, misfit: float, blur: float) -> None:
+    """Refuse a rim whose `step` is lost in what the profiles leave unexplained (`misfit`, both in
+    grey values), or that is too soft (`blur`, px).
+    """
+    if step < CLEAR * misfit:
+        raise refusal("too_dark", f"the edge is {step:.1f} grey values high, the rest {misfit:.1f}")
+    if blur > TOO_SOFT:
+        raise refusal("blurred", f"the edge is {blur:.1f} px wide")
+
+
+def check_round(ellipse: Ellipse, spread_of_edges: float) -> None:
+    """Refuse an opening that is no circle seen from the front."""
+    major, minor, _ = ellipse.axes
+    if minor < FLATTEST * major:
+        raise refusal("slot", f"its axes are {major:.0f} and {minor:.0f} px")
+    if spread_of_edges > RAGGED * ellipse.radius:
+        raise refusal("not_round", f"its edge scatters by {spread_of_edges:.1f} px")
+
+
 def _why_incomplete(band: Band, seen: Mask, radius: float) -> Reason:
     """Judge a rim by the profiles on which its edge is missing: either the hole goes on beyond it
     (a slot), or metal lies inside it (something covers the hole).
@@ -52,3 +87,20 @@ def _why_incomplete(band: Band, seen: Mask, radius: float) -> Reason:
     if max(goes_on, covered) < 0.3:
         return "not_round"
     return "slot" if goes_on > covered else "half_occluded"
+
+
+def why_no_hole(image: Image, ridge: Ridge) -> Reason:
+    """Say why a picture shows no round hole where the stripe passes: nothing at all, too much
+    light, or an opening of another shape.
+    """
+    if (image >= WHITE).mean() > MOSTLY:
+        return "saturated"
+    x, y = np.clip(np.rint(ridge.points(ridge.length)), 0, np.array(image.shape)[::-1] - 1).T
+    grey = image[y.astype(int), x.astype(int)].astype(np.float64)
+    gone = ridge.gone
+    if gone.sum() < LEAST_GAP or gone.all():
+        return "no_hole"
+    there, opening = float(np.median(grey[~gone])), float(np.median(grey[gone]))
+    if abs(there - opening) < UNLIKE * max(there, opening):
+        return "no_hole"
+    return "hole_cut_by_border" if gone[0] or gone[-1] else "not_round"

@@ -132,8 +132,10 @@ def _descend(model: RimModel, grey: Array, rays: Mask, state: Array) -> tuple[Pr
     return profile, float(np.sqrt((miss[rays] ** 2).mean(axis=1)).mean())
 
 
-def locate_edges(band: Band, profile: Profile) -> tuple[Array, Array]:
-    """Locate the sheet's end on every ray by itself: offset (n,) px, and misfit (n,) grey."""
+def locate_edges(band: Band, profile: Profile) -> tuple[Array, Array, Array]:
+    """Locate the sheet's end on every ray by itself: offset (n,) px; and how high its step is and
+    how badly it fits, both (n,) in grey values.
+    """
     found = profile
     for _ in range(3):
         step = _step(band.offsets, found)
@@ -141,8 +143,8 @@ def locate_edges(band: Band, profile: Profile) -> tuple[Array, Array]:
         slope = _without_levels(step.by_edge[..., None], step.shape)[..., 0] * height[:, None]
         move = (slope * miss).sum(axis=1) / np.maximum((slope**2).sum(axis=1), 1e-9)
         found = replace(found, edge=found.edge + np.clip(move, -0.7, 0.7))
-    miss, _ = _levels(band.grey, _step(band.offsets, found).shape)
-    return found.edge, np.sqrt((miss**2).mean(axis=1))
+    miss, height = _levels(band.grey, _step(band.offsets, found).shape)
+    return found.edge, height, np.sqrt((miss**2).mean(axis=1))
 
 
 def _step(offsets: Array, profile: Profile) -> Step:

@@ -51,10 +51,10 @@ class Ridge:
         """How many lines of the image lie along the stripe, but for a rest below BIN."""
         return BIN * len(self.strength)
 
-    def interrupted(self, lines: Mask) -> float:
-        """Say on which share of the image's `lines` (length,) along it the stripe is missing."""
-        dark = np.repeat(self.strength < PRESENT, BIN)
-        return float(dark[lines].mean()) if lines.any() else 0.0
+    @property
+    def gone(self) -> Mask:
+        """Tell on which of the image's lines (length,) the stripe is missing."""
+        return np.repeat(self.strength < PRESENT, BIN)
 
     def points(self, length: int) -> Array:
         """Give pixels (length, 2), x and y, one for each line along the stripe."""
