@@ -76,7 +76,8 @@ def align_body(alignment: Alignment, placed: Sequence[Placed]) -> Aligned:
     moved = _largest_motion(registration or rigid, placed)
     summary = {"method": alignment.method, "missing": missing} | _describe(registration)
     summary |= _describe_rigid_part(rigid, placed)
-    summary["statement"] = _statement(moved, alignment.limit_mm)
+    summary["statement"] = (_moved_body(moved, alignment.limit_mm)
+                            or _stray_datum(registration, alignment.limit_mm))
     return Aligned(aligned_from_body, registration, "", moved, summary)
 
 
@@ -97,7 +98,7 @@ def _register(alignment: Alignment, placed: Sequence[Placed],
     datums = [place.datum(axes) for place in placed
               if (axes := _axes(alignment, place.hole.id))]
     try:
-        return solve_body_registration(datums, Transform.identity(), leave_out=False)
+        return solve_body_registration(datums, Transform.identity())
     except UndeterminedError as loose:
         without = f" without {', '.join(missing)}, not measured" if missing else ""
         raise UndeterminedError(f"{loose}{without}") from None
@@ -134,7 +135,7 @@ def _describe(registration: Registration | None) -> dict[str, Any]:
         return {}
     return {"aligned_from_body": registration.body_from_measured.matrix.tolist(),
             "residuals_mm": registration.residuals, "rms_mm": registration.rms,
-            "redundancy": registration.redundancy}
+            "left_out_mm": registration.left_out, "redundancy": registration.redundancy}
 
 
 def _describe_rigid_part(rigid: Registration | None, placed: Sequence[Placed]) -> dict[str, Any]:
@@ -149,8 +150,19 @@ def _describe_rigid_part(rigid: Registration | None, placed: Sequence[Placed]) -
             "rms_before_mm": float(np.sqrt(np.mean(gaps**2))), "rms_after_mm": rigid.rms}
 
 
-def _statement(moved: float, limit: float) -> str:
+def _moved_body(moved: float, limit: float) -> str:
     if moved <= limit:
         return ""
     return (f"the body, the base or the sensor moved: all holes together are off by up to "
             f"{moved:.2f} mm, more than the {limit:g} mm that the job allows")
+
+
+def _stray_datum(registration: Registration | None, limit: float) -> str:
+    """A datum that the others do not bear out carries the whole body with it."""
+    misses = {name: miss for name, miss in (registration.left_out if registration else {}).items()
+              if miss is not None}
+    stray = max(misses, key=misses.__getitem__, default="")
+    if not stray or misses[stray] <= limit:
+        return ""
+    return (f"the datum {stray} is off by {misses[stray]:.2f} mm from where the others put it, "
+            f"more than the {limit:g} mm that the job allows: do not rely on the alignment")

@@ -194,6 +194,18 @@ def test_a_body_that_moved_too_far_is_not_called_good_even_when_aligned(papers):
     assert result.alignment["statement"]
 
 
+def test_a_datum_that_the_others_do_not_bear_out_is_named(papers):
+    hole = papers.hole("QP1")
+    stray = measured(hole, DISPLACED @ np.add(hole.centre, [1.2, 0, -0.9]))
+    outcomes = [stray if o.hole_id == "QP1" else o for o in body(papers, DISPLACED, noise=0.02)]
+    tight = BEST_FIT.model_copy(update={"limit_mm": 4.0})
+    assert judge_body(with_job(papers, alignment=tight), outcomes).alignment["statement"] == ""
+    far = measured(hole, DISPLACED @ np.add(hole.centre, [4.0, 0, -3.0]))
+    outcomes = [far if o.hole_id == "QP1" else o for o in outcomes]
+    assert "the datum QP1 is off by" in judge_body(
+        with_job(papers, alignment=tight), outcomes).alignment["statement"]
+
+
 def test_one_bad_hole_is_no_moved_body(papers):
     hole = papers.hole("AP1")
     outcomes = [measured(hole, np.add(hole.centre, [4, 0, 0])) if o.hole_id == "AP1" else o
