@@ -23,10 +23,11 @@ from cell.core.documents.calibration import (
 from cell.core.documents.complaint import name_place
 from cell.core.documents.job import JobDocument
 from cell.core.documents.nominals import Hole
+from cell.core.documents.nominals_table import read_nominals
 from cell.core.documents.offsets import OffsetsDocument
 from cell.core.documents.station import StationDocument
 from cell.core.documents.strict_yaml import Path, read_tree
-from cell.core.documents.text import parse, read_nominals
+from cell.core.documents.text import parse
 from cell.core.errors import DocumentError
 from cell.core.ports import RobotIdentity
 

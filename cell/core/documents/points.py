@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cell.core.documents.nominals import AXES
-from cell.core.documents.nominals_text import OPTIONAL, REQUIRED, check_ids, read_control, read_id
+from cell.core.documents.nominals_table import OPTIONAL, REQUIRED, check_ids, read_control, read_id
 from cell.core.documents.table import Row, read_table
 from cell.core.errors import DocumentError
 

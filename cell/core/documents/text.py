@@ -9,10 +9,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from cell.core.documents.complaint import complain
-from cell.core.documents.nominals_text import read_nominals
 from cell.core.documents.strict_yaml import read_tree, resolve
-
-__all__ = ["dump", "parse", "read_nominals"]
 
 Model = TypeVar("Model", bound=BaseModel)
 

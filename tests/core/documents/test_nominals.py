@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cell.core.documents.text import read_nominals
+from cell.core.documents.nominals_table import read_nominals
 from cell.core.errors import DocumentError
 
 HEADER = "id,x,y,z,i,j,k,diameter,thickness,side,control,tol_x,tol_y,tol_z,tol_d"
