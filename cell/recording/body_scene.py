@@ -17,8 +17,7 @@ EXAGGERATION = 40.0
 """How much longer than life a deviation is drawn: 1 mm shows as 40 mm."""
 
 NOMINAL, MEASURED, DEVIATION = "/body/nominal", "/body/measured", "/body/deviation"
-PLOT, VERDICT, TABLE = "/deviation", "/verdict", "/result"
-LIMITS = {"upper": 1.0, "lower": -1.0}
+PLOT, LIMITS, VERDICT, TABLE = "/deviation", "/deviation/limits", "/verdict", "/result"
 ROUND = np.linspace(0.0, 2.0 * np.pi, 37)
 
 
@@ -30,11 +29,9 @@ def draw_nominals(holes: Sequence[Hole]) -> Iterator[Drawing]:
     yield f"{NOMINAL}/names", rr.Points3D([hole.centre for hole in holes],
                                           colors=[colours.NOMINAL], labels=[h.id for h in holes],
                                           radii=rr.Radius.ui_points(1.5), show_labels=True)
-    for axis in AXES:
-        yield f"{PLOT}/{axis}", rr.SeriesPoints(colors=[colours.AXES[axis]], marker_sizes=[4.0],
-                                                names=[axis])
-    for side in LIMITS:
-        yield f"{PLOT}/{side}", rr.SeriesLines(colors=[(200, 70, 70)], names=[f"{side} limit"])
+    yield PLOT, rr.SeriesPoints(colors=[colours.AXES[axis] for axis in AXES], marker_sizes=[4.0],
+                                names=list(AXES))
+    yield LIMITS, rr.SeriesLines(colors=[colours.LIMIT] * 2, names=["upper limit", "lower limit"])
     yield VERDICT, rr.StateConfiguration(
         values=list(colours.VERDICTS), labels=[colours.words(name) for name in colours.VERDICTS],
         colors=list(colours.VERDICTS.values()))
@@ -55,11 +52,15 @@ def draw_features(features: Sequence[Feature], holes: Sequence[Hole]) -> Iterato
 
 def draw_verdict(feature: Feature) -> Iterator[Drawing]:
     """Draw one feature on the time line: its verdict, and each deviation as share of tolerance."""
+    deviation = feature.deviation or {}
     yield VERDICT, rr.StateChange(state=feature.verdict)
-    for axis, deviation in (feature.deviation or {}).items():
-        yield f"{PLOT}/{axis}", rr.Scalars([deviation / feature.tolerance[axis]])
-    for side, limit in LIMITS.items():
-        yield f"{PLOT}/{side}", rr.Scalars([limit])
+    yield PLOT, rr.Scalars([deviation[axis] / feature.tolerance[axis] if axis in deviation
+                            else np.nan for axis in AXES])
+
+
+def draw_limits() -> Iterator[Drawing]:
+    """Draw the tolerance into the plot, at one place of the time line."""
+    yield LIMITS, rr.Scalars([1.0, -1.0])
 
 
 def draw_result(result: BodyResult) -> Iterator[Drawing]:

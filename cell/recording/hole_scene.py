@@ -21,6 +21,7 @@ Drawing: TypeAlias = tuple[str, rr.AsComponents]
 Colour: TypeAlias = tuple[int, int, int]
 Trace: TypeAlias = Mapping[str, Array]
 
+CROSS = 12.0  # px
 NOTHING = np.zeros((0, 2))
 RING, LASER = layout.IMAGES
 SUMMARY = "/hole_summary"
@@ -68,16 +69,13 @@ def _draw_trace(trace: Trace) -> Iterator[Drawing]:
     """Draw the points, the ellipse and the paper's A, B and Q; empty where there are none, so that
     the hole before does not show through.
     """
-    ellipse = _lines(trace.get("ellipse"), colours.ELLIPSE)
-    chord = trace.get("chord", NOTHING)
-    a_b_q = np.vstack([chord, np.atleast_2d(trace.get("q", NOTHING))])
+    a_b_q = np.vstack([trace.get("chord", NOTHING), np.atleast_2d(trace.get("q", NOTHING))])
     yield f"{RING}/rim", _points(trace.get("rim"), colours.EDGE, 1.5)
-    yield f"{RING}/ellipse", ellipse
-    yield f"{RING}/centre", _points(trace.get("centre"), colours.ELLIPSE, 4.0, ["centre"])
+    yield f"{RING}/lines", _lines({**trace, **_cross(trace)}, {
+        "ellipse": colours.ELLIPSE, "across": colours.ELLIPSE, "down": colours.ELLIPSE})
     yield f"{LASER}/stripe", _points(trace.get("stripe"), colours.STRIPE, 1.5)
-    yield f"{LASER}/ellipse", ellipse
-    yield f"{LASER}/chord", _lines(trace.get("chord"), colours.CHORD)
-    yield f"{LASER}/chord/points", _points(a_b_q, colours.CHORD, 4.0, ["A", "B", "Q"])
+    yield f"{LASER}/lines", _lines(trace, {"ellipse": colours.ELLIPSE, "chord": colours.CHORD})
+    yield f"{LASER}/points", _points(a_b_q, colours.CHORD, 4.0, ["A", "B", "Q"])
 
 
 def _points(points: Array | None, colour: Colour, radius: float,
@@ -87,9 +85,19 @@ def _points(points: Array | None, colour: Colour, radius: float,
                        labels=labels[:len(rows)] or None, show_labels=bool(labels))
 
 
-def _lines(points: Array | None, colour: Colour) -> rr.LineStrips2D:
-    strips = [] if points is None else [points]
-    return rr.LineStrips2D(strips, colors=[colour], radii=rr.Radius.ui_points(1.0))
+def _cross(trace: Trace) -> dict[str, Array]:
+    """A cross over the centre: two strips."""
+    if "centre" not in trace:
+        return {}
+    x, y = np.ravel(trace["centre"])
+    return {"across": np.array([[x - CROSS, y], [x + CROSS, y]]),
+            "down": np.array([[x, y - CROSS], [x, y + CROSS]])}
+
+
+def _lines(trace: Trace, tints: Mapping[str, Colour]) -> rr.LineStrips2D:
+    drawn = [name for name in tints if name in trace]
+    return rr.LineStrips2D([trace[name] for name in drawn], colors=[tints[n] for n in drawn],
+                           radii=rr.Radius.ui_points(1.0))
 
 
 def summarise(record: HoleRecord, feature: Feature) -> str:

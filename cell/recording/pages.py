@@ -12,10 +12,12 @@ import cv2
 import numpy as np
 
 from cell.core.documents.record import SCHEMA, HoleRecord, Start, Stop
+from cell.core.documents.result import Outcome
 from cell.core.errors import DocumentError
 from cell.core.observation import Image
 from cell.recording import layout
 from cell.recording.chain import NOTHING, link, text_hash
+from cell.recording.echo import outcomes_of, resolve_to_holes
 from cell.recording.forms import form_of, pixel_hash
 from cell.recording.rows import Row, damage_explained, read_rows
 
@@ -67,8 +69,13 @@ def read_pages(path: Path) -> Iterator[Page]:
 
 def _pages(path: Path) -> Iterator[Page]:
     chain = NOTHING
+    outcomes: dict[str, Outcome] = {}
     for _, rows in groupby(read_rows(path), _sheaf):
         page = _page(list(rows), chain)
+        if isinstance(page.record, HoleRecord):
+            outcomes |= outcomes_of(page.record)
+        elif isinstance(page.record, Stop):
+            page = replace(page, record=resolve_to_holes(page.record, outcomes))
         if chain == NOTHING and (page.missing or not isinstance(page.record, Start)):
             raise DocumentError("holds no whole start record", source=str(path))
         yield page

@@ -12,7 +12,13 @@ from cell.core.documents.result import BodyResult
 from cell.metrology.decide import judge_run
 from cell.recording import layout
 from cell.recording.blueprint import build_blueprint
-from cell.recording.body_scene import draw_features, draw_nominals, draw_result, draw_verdict
+from cell.recording.body_scene import (
+    draw_features,
+    draw_limits,
+    draw_nominals,
+    draw_result,
+    draw_verdict,
+)
 from cell.recording.hole_scene import Drawing, draw_camera, draw_hole, draw_summary
 from cell.recording.pages import without_images
 
@@ -31,6 +37,7 @@ class Scene:
         self._records: dict[int, HoleRecord] = {}
         self._draw(draw_camera(self._papers.calibration), static=True)
         self._draw(draw_nominals(self._papers.planned_holes), static=True)
+        self._draw_limits(0)
         stream.send_blueprint(build_blueprint(self._papers, following))
 
     def add(self, at: int, record: HoleRecord) -> None:
@@ -50,6 +57,11 @@ class Scene:
             for at in self._records:
                 self._judge(at, result)
         self._draw(draw_result(result), static=True)
+        self._draw_limits(max(self._records, default=0))
+
+    def _draw_limits(self, at: int) -> None:
+        self._at(at)
+        self._draw(draw_limits())
 
     def _result(self) -> BodyResult:
         return judge_run(self._papers, self._start, list(self._records.values()))

@@ -13,10 +13,11 @@ from typing import Any, Protocol
 import pyarrow as pa
 
 from cell.core.documents.record import HoleRecord, Start, Stop
-from cell.core.documents.result import Measured
+from cell.core.documents.result import Measured, Outcome
 from cell.core.errors import DocumentError
 from cell.recording import layout
 from cell.recording.chain import NOTHING, link, text_hash
+from cell.recording.echo import outcomes_of, refer_to_holes
 from cell.recording.forms import Plain, form_of
 from cell.recording.keys import key_path, read_key
 from cell.recording.picture import Picture
@@ -52,6 +53,7 @@ class Recorder:
         self._stream = _new_stream(path, start.recording_id)
         self.path, self._start, self._live = path, start, live
         self._chain, self._holes, self._views = NOTHING, 0, 0
+        self._outcomes: dict[str, Outcome] = {}
         self._failure: BaseException | None = None
         self._pending: deque[Future[None]] = deque()
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="recorder")
@@ -126,11 +128,12 @@ class Recorder:
             self._stream.at(layout.VIEW_TIMELINE, self._views + index)
             self._stream.write_image(f"{layout.CAMERA}/{view.light}", view.image, hashes[index])
         self._picture.add(self._holes, record)
+        self._outcomes |= outcomes_of(record)
         self._views += len(hashes)
         self._holes += 1
 
     def _write_stop(self, stop: Stop) -> None:
-        self._write_record(layout.STOP, stop)
+        self._write_record(layout.STOP, refer_to_holes(stop, self._outcomes))
         self._picture.finish(stop)
 
     def _write_record(self, place: layout.Place, record: object) -> Plain:
