@@ -27,7 +27,7 @@ from cell.core.documents.nominals_table import read_nominals
 from cell.core.documents.offsets import OffsetsDocument
 from cell.core.documents.station import StationDocument
 from cell.core.documents.strict_yaml import Path, read_tree
-from cell.core.documents.text import parse
+from cell.core.documents.text import Model, parse
 from cell.core.errors import DocumentError
 from cell.core.ports import RobotIdentity
 
@@ -90,16 +90,19 @@ class Papers:
 
 
 def _parse(texts: Mapping[str, str], set_id: str, where: Mapping[str, str]) -> Papers:
-    def read(model: type, name: str):  # type: ignore[no-untyped-def]  # noqa: ANN202
-        return parse(model, texts[name], where[name]) if name in texts else None
+    def read(model: type[Model], name: str) -> Model:
+        return parse(model, texts[name], where[name])
+
+    def read_if_there(model: type[Model], name: str) -> Model | None:
+        return read(model, name) if name in texts else None
 
     calibration = Calibration(set_id, read(SensorDocument, "sensor"),
                               read(HandEyeDocument, "hand_eye"), read(BodyDocument, "body"),
-                              read(KinematicsDocument, "kinematics"))
+                              read_if_there(KinematicsDocument, "kinematics"))
     return Papers(texts, set_id, read(JobDocument, "job"),
                   read_nominals(texts["nominals"], where["nominals"]),
                   read(StationDocument, "cell"), calibration,
-                  read(OffsetsDocument, "offsets"), where)
+                  read_if_there(OffsetsDocument, "offsets"), where)
 
 
 def _contradictions(papers: Papers) -> Iterator[Contradiction]:
