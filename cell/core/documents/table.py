@@ -79,7 +79,10 @@ def read_table(text: str, source: str, required: Sequence[str],
         raise DocumentError(f"the table is empty; expected the columns {', '.join(required)}",
                             source=source)
     (line, header), *body = rows
-    _check_header(header, source, line, (tuple(required), tuple(optional)))
+    for problem in _header_problems(header, tuple(required), tuple(optional)):
+        raise DocumentError(f"{problem}; expected the columns {', '.join(required)}"
+                            + (f" and optionally {', '.join(optional)}" if optional else ""),
+                            source=source, place=f"line {line}")
     return tuple(_row(header, cells, Row(source, number, {})) for number, cells in body)
 
 
@@ -91,25 +94,19 @@ def _rows(text: str) -> Iterator[tuple[int, list[str]]]:
             yield reader.line_num, stripped
 
 
-def _check_header(header: list[str], source: str, line: int,
-                  columns: tuple[tuple[str, ...], tuple[str, ...]]) -> None:
-    required, optional = columns
-    known = required + optional
-    missing = [name for name in required if name not in header]
-    unknown = [name for name in header if name not in known]
-    doubled = sorted({name for name in header if header.count(name) > 1})
-    problem = (("the columns are separated by semicolons: expected commas, and decimal points"
-                if any(";" in name for name in header) else "")
-               or ("the columns are separated by tabs: expected commas"
-                   if any("\t" in name for name in header) else "")
-               or (f"the column {doubled[0]!r} stands twice" if doubled else "")
-               or (f"the column {unknown[0]!r} is unknown{_advice(unknown[0], known)}"
-                   if unknown else "")
-               or (f"missing: {', '.join(missing)}" if missing else ""))
-    if problem:
-        raise DocumentError(f"{problem}; expected the columns {', '.join(required)}"
-                            + (f" and optionally {', '.join(optional)}" if optional else ""),
-                            source=source, place=f"line {line}")
+def _header_problems(header: list[str], required: tuple[str, ...],
+                     optional: tuple[str, ...]) -> Iterator[str]:
+    """Find what is wrong with a header, the most telling first."""
+    for separator, name in ((";", "semicolons"), ("\t", "tabs")):
+        if any(separator in column for column in header):
+            yield f"the columns are separated by {name}: expected commas, and decimal points"
+    for column in header:
+        if header.count(column) > 1:
+            yield f"the column {column!r} stands twice"
+        if column not in required + optional:
+            yield f"the column {column!r} is unknown{_advice(column, required + optional)}"
+    if missing := [column for column in required if column not in header]:
+        yield f"missing: {', '.join(missing)}"
 
 
 def _advice(name: str, known: tuple[str, ...]) -> str:
