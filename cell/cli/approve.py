@@ -9,7 +9,7 @@ import typer
 from cell.cli.words import answers, print_json
 
 
-def approve(job: Path = typer.Argument(..., help="The job's file, jobs/<job>.yaml."),
+def approve(job: Path = typer.Argument(..., help="The job's file, jobs/JOB.yaml."),
             by: str = typer.Option("", "--by", help="Who approves."),
             cell: str | None = typer.Option(None, "--cell", help="Which cell; else the job's."),
             note: str = typer.Option("", "--note", help="Why, or on what evidence."),

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from cell.programs.shift.board import Board
 
 
-def shift(file: Path | None = typer.Argument(None, help="The shift's file, jobs/<shift>.yaml."),
+def shift(file: Path | None = typer.Argument(None, help="The shift's file, jobs/SHIFT.yaml."),
           simulate: bool = typer.Option(False, "--simulate", help="A virtual line brings virtual "
                                         "bodies; simulated cells only."),
           bodies: int | None = typer.Option(None, "--bodies", min=1, help="End after so many."),
