@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cell.core.geometry import Array, Transform
 from cell.sim.scene import Behind, BodyErrors, Finish, HoleScene, Panel, SceneDocument
@@ -45,12 +47,19 @@ class Bore:
 
     def outside(self, u: Array, v: Array) -> Array:
         """Return how far outside of the rim places (...) on the sheet lie, in mm."""
-        across, up = u - self.centre[0], v - self.centre[1]
-        beyond = np.sqrt(across * across + up * up) - self.radius
+        across, up = u - float(self.centre[0]), v - float(self.centre[1])
+        far = np.sqrt(across * across + up * up)
+        beyond = far - self.radius
         near = np.abs(beyond) < NEAR_RIM
-        turns = np.multiply.outer(np.arctan2(up[near], across[near]), FORM_ORDERS)
-        beyond[near] -= np.cos(turns) @ self.form[0] + np.sin(turns) @ self.form[1]
+        towards = (across[near] + 1j * up[near]) / far[near]
+        beyond[near] -= np.polyval(self._lobes, towards).real
         return beyond
+
+    @cached_property
+    def _lobes(self) -> NDArray[np.complex128]:
+        """The form as a polynomial in exp(i angle), highest order first."""
+        falling = (self.form[0] - 1j * self.form[1])[::-1]
+        return np.concatenate([falling, np.zeros(FORM_ORDERS[0])])
 
 
 @dataclass(frozen=True, eq=False)

@@ -115,7 +115,7 @@ class VirtualCamera:
 
     def _follow(self, readings: list[Any]) -> None:
         for reading in readings:
-            self._world.arm.follow(reading.joints)
+            self._world.arm.follow(reading.joints, reading.time)
 
     def _send_due(self) -> None:
         while self._queue and self._queue[0][0] <= time.monotonic():

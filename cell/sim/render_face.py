@@ -51,13 +51,13 @@ class Face:
 
     def depth(self, rays: Rays) -> Array:
         """Return z where rays meet the plane."""
-        return (self.outward @ self.camera_from_face.translation) / rays.along(self.outward)
+        return float(self.outward @ self.camera_from_face.translation) / rays.along(self.outward)
 
     def place(self, rays: Rays, depth: Array) -> tuple[Array, Array]:
         """Return u and v where rays end at `depth`."""
         origin, axes = self.camera_from_face.translation, self.camera_from_face.rotation
-        return (depth * rays.along(axes[:, 0]) - origin @ axes[:, 0],
-                depth * rays.along(axes[:, 1]) - origin @ axes[:, 1])
+        return (depth * rays.along(axes[:, 0]) - float(origin @ axes[:, 0]),
+                depth * rays.along(axes[:, 1]) - float(origin @ axes[:, 1]))
 
     def places(self, rays: Rays) -> Places:
         """Return depth, u and v where rays meet the plane."""
@@ -73,8 +73,8 @@ class Face:
 
 def covered(lens: Lens, u: Array, v: Array, half: Array, depth: Array) -> Light:
     """Return how much of each pixel a rectangle of half size (2,) covers."""
-    inside = np.minimum(half[0] - np.abs(u), half[1] - np.abs(v))
-    pixel = depth / lens.sensor.camera.matrix[0, 0]
+    inside = np.minimum(float(half[0]) - np.abs(u), float(half[1]) - np.abs(v))
+    pixel = depth / float(lens.sensor.camera.matrix[0, 0])
     return (np.clip(0.5 + inside / pixel, 0.0, 1.0) * (depth > 0.0)).astype(np.float32)
 
 

@@ -44,7 +44,7 @@ def render_sphere(lens: Lens, lamps: Lamps, camera_from_base: Transform,
     rays = lens.rays
     length2 = rays.x**2 + rays.y**2 + 1.0
     along = rays.along(centre) / length2
-    miss2 = centre @ centre - along**2 * length2
+    miss2 = np.maximum(float(centre @ centre) - along**2 * length2, 0.0)
     inside = np.maximum(sphere.radius**2 - miss2, 0.0)
     depth = along - np.sqrt(inside / length2)
     pixel = centre[2] / lens.sensor.camera.matrix[0, 0]

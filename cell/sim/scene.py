@@ -79,7 +79,8 @@ class ArmScene(Document):
     """How the true arm differs from the controller's model of it. `ideal` switches all of it off.
 
     Residual lengths and angles of the kinematic rows, hysteresis and repeatability of each joint
-    (all standard deviations), and the links' shortening when cold, which fades with `warm_up_s`.
+    (all standard deviations); the sway of the joints after a stop, which fades with `sway_s`; and
+    the links' shortening when cold, which fades with `warm_up_s`.
     """
 
     model: str
@@ -88,6 +89,8 @@ class ArmScene(Document):
     angle_deg: Magnitude = 0.0
     hysteresis_deg: Magnitude = 0.0
     repeatability_deg: Magnitude = 0.0
+    sway_deg: Magnitude = 0.0
+    sway_s: Positive = 0.05
     cold_mm: Magnitude = 0.0
     warm_up_s: Positive = 1800.0
 

@@ -13,7 +13,7 @@ PERFECT = ArmScene(model="ur10e")
 
 
 def flange(arm, joints, time=1e9):
-    arm.follow(joints)
+    arm.follow(joints, time - 1000.0)
     return arm.flange(MODEL.forward(joints), joints, time)
 
 
@@ -62,6 +62,19 @@ def test_every_standstill_errs_anew_but_stays_while_it_stands():
     spread = np.array(stood).std(axis=0)
     assert np.linalg.norm(spread) == pytest.approx(0.06, rel=0.6)
     assert np.linalg.norm(np.mean(stood, axis=0) - MODEL.forward(JOINTS).translation) < 0.02
+
+
+def test_after_a_stop_it_swings_and_settles():
+    arm = TrueArm(PERFECT.model_copy(update={"sway_deg": 0.01, "sway_s": 0.05}), 3)
+    arm.follow(other(JOINTS), 0.0)
+    arm.follow(JOINTS, 1.0)
+    reported = MODEL.forward(JOINTS)
+    off = [arm.flange(reported, JOINTS, 1.0 + wait).distance(reported)[0]
+           for wait in (0.0, 0.1, 0.2, 0.5)]
+    assert off[0] > 0.1
+    assert off[1] < 0.2 * off[0]
+    assert off[2] < 0.03 * off[0]
+    assert off[3] < 1e-4
 
 
 def test_a_cold_arm_is_short_and_warms_up():
