@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from cell.archive.files import read_text, replace_text, sync_folder
+from cell.archive.files import read_text, replace_text, sync
 from cell.core.documents.base import Document
 from cell.core.documents.calibration import ActiveDocument, HandEyeDocument, SensorDocument
 from cell.core.documents.text import dump, parse
@@ -130,11 +130,12 @@ def write_set(folder: Path, made: Path, created: str) -> str:
     replace_text(made / MANIFEST, dump(SetDocument(created=created, files=hashes)))
     for path in files:
         path.chmod(0o444)
+        sync(path)
     home = folder / "sets" / set_id
     try:
         home.parent.mkdir(exist_ok=True)
         made.rename(home)
-        sync_folder(home.parent)
+        sync(home.parent)
     except OSError as error:
         raise DocumentError(f"the set cannot be kept: {error.strerror}", source=str(home)) from None
     return set_id
