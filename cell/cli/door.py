@@ -17,6 +17,7 @@ from cell.cli.check import check
 from cell.cli.compare import compare
 from cell.cli.error_model import error_model
 from cell.cli.locate import locate
+from cell.cli.prune import prune
 from cell.cli.repair import repair
 from cell.cli.report import report
 from cell.cli.results import results_app
@@ -52,6 +53,7 @@ app.add_typer(results_app)
 app.command()(shift)
 app.command()(audit)
 app.command()(repair)
+app.command()(prune)
 app.command()(view)
 app.add_typer(seal_key_app)
 app.command()(check)
