@@ -100,6 +100,10 @@ def check_set(home: Path) -> None:
     if not manifest.exists():
         return
     document = parse(SetDocument, read_text(manifest), str(manifest))
+    for file in home.glob("*.yaml"):
+        if file.name not in document.files and file.name != MANIFEST:
+            raise DocumentError(f"added since the set was made on {document.created}: sets are "
+                                "immutable, make a new one", source=str(file))
     for name, expected in document.files.items():
         file = home / name
         if not file.resolve().is_relative_to(home.resolve()) or not file.is_file():

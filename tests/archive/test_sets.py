@@ -43,6 +43,12 @@ def test_a_set_that_was_changed_is_refused(workplace, second_set, file):
         read_set(workplace.cell, second_set)
 
 
+def test_a_set_with_another_document_is_refused(workplace, second_set):
+    (workplace.cell / "sets" / second_set / "kinematics.yaml").write_text("model: ur10e\n")
+    with pytest.raises(DocumentError, match=r"kinematics.yaml: added.*immutable"):
+        read_set(workplace.cell, second_set)
+
+
 def test_a_set_that_lost_a_file_is_refused(workplace, second_set):
     (workplace.cell / "sets" / second_set / "images" / "0001.png").unlink()
     with pytest.raises(DocumentError, match="missing"):
