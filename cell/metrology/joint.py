@@ -92,7 +92,7 @@ def _tangents(normal: Array, stripe: StripeSight) -> Array:
 def _prior(start: Circle, rim: Rim, expected: Expected) -> Prior:
     mm_per_px = start.radius / float(np.sqrt(rim.ellipse[2] * rim.ellipse[3]))
     beside = max(0.0, rim.ambiguity - CLEAN) * mm_per_px
-    form_sigma = float(np.hypot(FORM_SIGMA, beside / np.sqrt(3.0)))
+    form_sigma = float(np.hypot(FORM_SIGMA, beside / 2.0))
     radius = start.radius if expected.radius is None else expected.radius
     radius_sigma = UNKNOWN_RADIUS_SIGMA if expected.radius is None else RADIUS_SIGMA
     return Prior(np.zeros(2), np.full(2, normal_sigma(expected)), form_sigma, radius,

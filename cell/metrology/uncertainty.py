@@ -33,8 +33,9 @@ Budget: TypeAlias = dict[str, Array]
 """Covariances (4, 4) of x, y, z and the radius by source, mm²; sources are independent."""
 
 FORM_SIGMA = 0.004  # mm, each wave of the rim: what punched and drilled holes show
-CLEAN = 0.3  # px of ambiguity that any rim shows
-CENTRE_DOUBT, RADIUS_DOUBT = 0.03, 0.07  # px: what the light does to the edge of a clean rim
+CLEAN = 0.45  # px of ambiguity that any rim shows
+CENTRE_DOUBT, RADIUS_DOUBT = 0.025, 0.1  # px: what light and edge break do to a clean rim
+CENTRE_SHARE, RADIUS_SHARE = 0.35, 0.6  # of the ambiguity, at most
 SHOWN = [0, 1, 2, RADIUS]
 
 
@@ -99,9 +100,9 @@ def _edge_ambiguity(solution: Solution, ambiguity: float) -> Array:
     """Let the seen edge lie beside the bore's all round, and more so on one side."""
     rim = solution.seen[0]
     toward = rim.rows.toward
-    beside = max(0.0, ambiguity - CLEAN)
-    constant = np.hypot(beside / np.sqrt(3.0), RADIUS_DOUBT)
-    one_sided = np.hypot(beside / np.sqrt(3.0), CENTRE_DOUBT)
+    beyond = max(0.0, ambiguity - CLEAN)
+    constant = np.hypot(min(beyond, RADIUS_SHARE * ambiguity), RADIUS_DOUBT)
+    one_sided = np.hypot(min(beyond, CENTRE_SHARE * ambiguity), CENTRE_DOUBT)
     sigma = np.array([constant, one_sided, one_sided])
     causes = np.column_stack([np.ones(len(toward)), toward]) * sigma
     return _spread(solution.response(rim, causes), np.eye(3))
