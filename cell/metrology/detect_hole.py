@@ -59,8 +59,8 @@ def detect_rim(image: Image, hole: Hole, camera: CameraModel, expected: Expected
     Raises:
         UnmeasurableError: it is cut by the border, covered or not round.
     """
+    check_whole(image, hole)
     check_inside(image, hole.ellipse)
-    check_whole(hole)
     rough, seen, doubled = _rough_rim(hole)
     walls = [predict_wall(rough, hole.inside, camera, expected)]
     if doubled and walls[0].share == 0.0:

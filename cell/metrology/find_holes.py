@@ -10,6 +10,7 @@ import numpy as np
 from cell.core.geometry import Array
 from cell.core.observation import Image
 from cell.core.optics import CameraModel
+from cell.metrology.arrays import Mask
 from cell.metrology.band import Patch, sample_band, smooth_around, spread
 from cell.metrology.edges import find_edges
 from cell.metrology.ellipse import Ellipse, project_circle
@@ -97,6 +98,13 @@ def _look(image: Image, circle: Circle, expected: Expected, camera: CameraModel)
     if rise < 0.3 * EDGE_WIDTH * contrast:  # a line, not a step: scratch, groove, glint
         return None
     return Hole(ellipse, circle.inside, float(seen.mean()), contrast, patch)
+
+
+def within(image: Image, ellipse: Ellipse, rays: int) -> Mask:
+    """Tell which of `rays` points on an ellipse lie within the image, and not on its border."""
+    rim = ellipse.points(np.linspace(0.0, 2.0 * np.pi, rays, endpoint=False))
+    last = np.array(image.shape[::-1]) - 2.0
+    return np.asarray(((rim >= 1.0) & (rim <= last)).all(axis=1))
 
 
 def _expected_ellipse(circle: Circle, camera: CameraModel, expected: Expected) -> Ellipse:

@@ -13,7 +13,7 @@ from cell.metrology.arrays import Mask
 from cell.metrology.band import Band, sample_band, spread
 from cell.metrology.edges import find_edges
 from cell.metrology.ellipse import Ellipse
-from cell.metrology.find_holes import MARGIN, RAYS, Hole
+from cell.metrology.find_holes import MARGIN, RAYS, Hole, within
 from cell.metrology.reasons import Reason, refusal
 from cell.metrology.ridge import Ridge
 
@@ -38,20 +38,18 @@ def check_lit(image: Image) -> None:
 
 def check_inside(image: Image, rim: Ellipse) -> None:
     """Refuse a hole that reaches beyond the image."""
-    height, width = image.shape
-    around = rim.points(np.linspace(0.0, 2.0 * np.pi, 64))
-    if (around < 1.0).any() or (around > [width - 2.0, height - 2.0]).any():
+    if not within(image, rim, RAYS).all():
         raise refusal("hole_cut_by_border")
 
 
-def check_whole(hole: Hole) -> None:
+def check_whole(image: Image, hole: Hole) -> None:
     """Refuse a rim of which too little is seen, with the reason that fits."""
     radius = hole.ellipse.radius
     offsets = spread(MARGIN * radius, max(0.5, radius / 60.0))
     band = sample_band(hole.patch, hole.ellipse, offsets, RAYS)
     edges = find_edges(band, hole.inside, 0.4 * hole.contrast)
     seen = edges[np.abs(edges.offset) < max(2.0, 0.03 * radius)].rays(RAYS)
-    if seen.mean() < COMPLETE:
+    if seen[within(image, hole.ellipse, RAYS)].mean() < COMPLETE:
         raise refusal(_why_incomplete(band, seen, radius),
                       f"{seen.mean():.0%} of the rim follows an ellipse")
 
