@@ -8,7 +8,11 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import hypothesis
 import pytest
+
+hypothesis.settings.register_profile("loaded", deadline=None)  # a busy machine proves nothing wrong
+hypothesis.settings.load_profile("loaded")
 
 ROOT = Path(__file__).parents[1]
 
