@@ -137,7 +137,7 @@ class Operator(Protocol):
 LineVerdict: TypeAlias = Literal["ok", "nok", "uncertain", "incomplete"]
 Command: TypeAlias = Literal["start", "abort", "reset", "bypass", "end_bypass", "stop"]
 Refusal: TypeAlias = Literal["", "unknown_type", "no_body", "no_body_id", "not_ready", "master_due",
-                             "result_held", "nothing_to_do"]
+                             "result_held", "nothing_to_do", "not_named"]
 Fault: TypeAlias = Literal[
     "", "protective_stop", "safeguard_stop", "emergency_stop", "local_mode", "paused", "robot_lost",
     "robot_failed", "camera_lost", "lights_lost", "laser_dark", "disk_full", "recording_failed",

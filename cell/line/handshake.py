@@ -126,8 +126,9 @@ class Handshake:
     def _order(self, command: Command) -> Order:
         read = {name: registers.read_from_plc(self._from_plc, name)
                 for name in ("body_id", "body_type", "operator", "reason")}
-        return Order(command, str(read["body_id"]), int(read["body_type"]), str(read["operator"]),
-                     str(read["reason"]), bool(self._from_plc[2] & (1 << BODY_PRESENT)))
+        return Order(command, str(read["body_id"]), int(read["body_type"]),
+                     str(read["operator"] or ""), str(read["reason"] or ""),
+                     body_present=bool(self._from_plc[2] & (1 << BODY_PRESENT)))
 
     def _acknowledge(self) -> None:
         """Let the held result go, if it is the one that the PLC means."""

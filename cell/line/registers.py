@@ -41,8 +41,8 @@ FROM_PLC = (
     Register("signals", 2, "bit 0: a body is present and clamped", "bits"),
     Register("body_type", 3, "type of the body, before start"),
     Register("acknowledged", 4, "sequence of the result that is acknowledged", "long", 2),
-    Register("operator", 6, "number of the person who asks for the bypass"),
-    Register("reason", 7, "reason of the bypass, a number of the plant's list"),
+    Register("operator", 6, "number of the person who asks for the bypass or resets"),
+    Register("reason", 7, "reason of the bypass, a number of the shift's list"),
     Register("body_id", 8, "number of the body (VIN), before start", "text", 10),
 )
 FROM_CELL = (
@@ -77,12 +77,12 @@ STATES = {"starting": 1, "ready": 2, "measuring": 3, "result": 4, "bypass": 5, "
 VERDICTS: dict[LineVerdict, int] = {"ok": 1, "nok": 2, "uncertain": 3, "incomplete": 4}
 REFUSALS: dict[Refusal | Literal["wrong_sequence"], int] = {
     "": 0, "unknown_type": 1, "no_body": 2, "no_body_id": 3, "not_ready": 4, "master_due": 5,
-    "result_held": 6, "nothing_to_do": 7, "wrong_sequence": 8}
+    "result_held": 6, "nothing_to_do": 7, "wrong_sequence": 8, "not_named": 9}
 FAULTS: dict[Fault, int] = {
     "": 0, "protective_stop": 21, "safeguard_stop": 22, "emergency_stop": 23, "local_mode": 24,
     "paused": 25, "robot_lost": 26, "robot_failed": 27, "camera_lost": 31,
-    "lights_lost": 32, "laser_dark": 33, "disk_full": 41, "recording_failed": 42, "results_lost": 43,
-    "holes_refused": 51, "datum_missing": 52, "master_failed": 53}
+    "lights_lost": 32, "laser_dark": 33, "disk_full": 41, "recording_failed": 42,
+    "results_lost": 43, "holes_refused": 51, "datum_missing": 52, "master_failed": 53}
 
 FROM_PLC_SIZE = max(r.address + r.size for r in FROM_PLC)
 FROM_CELL_SIZE = max(r.address + r.size for r in FROM_CELL)

@@ -1,7 +1,7 @@
 """A person in the PLC's place: what is typed, and that two sources of orders do not mix."""
 
 import pytest
-from made_line import RememberingLine
+from made_line import RememberingLine, When
 
 from cell.core.ports import LineResult, Order
 from cell.line.manual import Keyboard, LineWithKeyboard, ManualLine, parse_order
@@ -34,7 +34,7 @@ def test_a_result_is_told_and_waits_for_its_acknowledgement():
 
 def test_orders_of_the_keyboard_are_not_echoed_to_the_plc():
     plc_order = Order("start", "B1", 1)
-    other = RememberingLine([plc_order])
+    other = RememberingLine([When("starting", plc_order)])
     line = LineWithKeyboard(other, Keyboard(["r Meier"], lambda text: None))
     line.open()
     taken = []

@@ -54,6 +54,8 @@ class Desk:
     def _follow(self, order: Order) -> Refusal:
         if order.command == "stop":
             self.stopping = True
+        elif order.command == "bypass" and not (order.operator and order.reason):
+            return "not_named"
         elif order.command == "bypass" and self.bypass is None:
             self._begin_bypass(order)
         elif order.command == "end_bypass" and self.bypass is not None:

@@ -76,15 +76,12 @@ class Shift:
                 self._guarded(self._answer_open_visits)
 
     def _idle(self) -> None:
-        master = self._desk.document.master
-        self._desk.update(trouble=self._measuring.trouble)
+        master, state, instruction = self._desk.document.master, "ready", "Ready for the next body."
         if self._desk.bypass is not None:
-            self._desk.update(state="bypass", instruction="Bodies pass unmeasured.")
+            state, instruction = "bypass", "Bodies pass unmeasured."
         elif self._master_due and master is not None:
-            self._desk.update(state="master_due", instruction="Bring the master body "
-                              f"(type {master.type}).")
-        else:
-            self._desk.update(state="ready", instruction="Ready for the next body.")
+            state, instruction = "master_due", f"Bring the master body (type {master.type})."
+        self._desk.update(state=state, instruction=instruction, trouble=self._measuring.trouble)
 
     def _follow(self, order: Order) -> None:
         if order.command != "start":

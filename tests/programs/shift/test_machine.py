@@ -233,6 +233,12 @@ def bypasses_table():
     return bypasses
 
 
+@pytest.mark.parametrize("nameless", [Order("bypass", reason="3"), Order("bypass", operator="17")])
+def test_a_bypass_without_who_and_why_is_refused(made, nameless):
+    made.run(nameless, start("A"), STOP)
+    assert made.line.answers[0] == (nameless, "not_named") and made.verdicts == [("A", "ok")]
+
+
 def test_a_bypass_outlives_a_restart_but_not_its_time(made):
     made.run(Order("bypass", operator="17", reason="x"), start("A"), STOP)
     made.run(start("B"), STOP)
