@@ -8,13 +8,14 @@ from __future__ import annotations
 import socket
 import struct
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from cell.core.errors import DeviceError
 from cell.core.geometry import Array, Transform
-from cell.sim.controller.rtde import Recipe, Value, package, packages
+from cell.sim.controller.rtde import Recipe, package, packages
 
 PORT, RATE_HZ = 30004, 125.0
 PROTOCOL = struct.pack(">H", 2)
@@ -25,12 +26,20 @@ MM = 1000.0
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """One report of the controller: its clock (s), joints (6,), flange pose, digital outputs."""
+    """One report of the controller: its clock (s), joints (6,), digital outputs, and the poses as
+    a controller has them: metres and a rotation vector.
+    """
 
     time: float
     joints: Array
-    base_from_flange: Transform
     outputs: int
+    base_from_tcp: tuple[float, ...]
+    flange_from_tcp: tuple[float, ...]
+
+    @property
+    def base_from_flange(self) -> Transform:
+        """Where the flange stands, whichever TCP is active; mm."""
+        return _transform(self.base_from_tcp) @ _transform(self.flange_from_tcp).inverse
 
 
 class ControllerFeed:
@@ -117,8 +126,7 @@ class ControllerFeed:
     def _gone(self) -> None:
         self.close()
         if self.reading is not None:
-            last = self.reading
-            self.reading = Reading(last.time, last.joints, last.base_from_flange, outputs=0)
+            self.reading = replace(self.reading, outputs=0)
 
     def _negotiate(self) -> None:
         if self._ask("V", PROTOCOL) != b"\x01":
@@ -146,13 +154,12 @@ class ControllerFeed:
             self._received += chunk
 
 
-def _reading(values: dict[str, Value]) -> Reading:
-    pose, offset = (_transform(values[name]) for name in ("actual_TCP_pose", "tcp_offset"))
-    return Reading(float(values["timestamp"]),  # type: ignore[arg-type]
-                   np.array(values["actual_q"]), pose @ offset.inverse,
-                   int(values["actual_digital_output_bits"]))  # type: ignore[arg-type]
+def _reading(values: dict[str, Any]) -> Reading:
+    return Reading(values["timestamp"], np.array(values["actual_q"]),
+                   values["actual_digital_output_bits"], values["actual_TCP_pose"],
+                   values["tcp_offset"])
 
 
-def _transform(pose: Value) -> Transform:
+def _transform(pose: tuple[float, ...]) -> Transform:
     vector = np.array(pose)
     return Transform.from_parts(vector[3:], MM * vector[:3])
