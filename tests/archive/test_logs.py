@@ -37,3 +37,16 @@ def test_a_folder_that_cannot_be_written_is_refused(tmp_path):
 def test_a_folder_that_takes_no_files_is_refused():
     with pytest.raises(DocumentError, match="recordings cannot be written here"):
         check_logs(Path("/proc/self/fdinfo"))
+
+
+def test_a_disk_without_room_for_a_megabyte_is_refused(tmp_path):
+    """The limit on a file's size stands for the full disk: the same write fails."""
+    resource = pytest.importorskip("resource", reason="this system has no limits to set")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (500_000, before[1]))
+    try:
+        with pytest.raises(DocumentError, match="recordings cannot be written here: File too large"):
+            check_logs(tmp_path / "logs")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert list((tmp_path / "logs").iterdir()) == []
