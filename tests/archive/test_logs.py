@@ -45,7 +45,7 @@ def test_a_disk_without_room_for_a_megabyte_is_refused(tmp_path):
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (500_000, before[1]))
     try:
-        with pytest.raises(DocumentError, match="recordings cannot be written here: File too large"):
+        with pytest.raises(DocumentError, match="cannot be written here: File too large"):
             check_logs(tmp_path / "logs")
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
