@@ -1,0 +1,53 @@
+"""A body that the virtual cell measured once: its observations, measured again with today's method.
+
+The observations (images, poses, papers) are those of the golden recording; the outcomes are made
+now, so that a test of the audit does not fail because the method became better.
+"""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from cell.core.documents.papers import Papers
+from cell.core.documents.record import HoleRecord, Start, Stop
+from cell.metrology.decide import judge_run
+from cell.metrology.measure import measure_hole
+from cell.recording import Recorder, collect_versions, read
+
+GOLDEN = Path(__file__).parent / "golden" / "schema_1.rrd"
+
+
+@cache
+def measured_anew() -> tuple[Start, tuple[HoleRecord, ...]]:
+    """The start and the holes of the golden recording, with the outcomes of today."""
+    seen = read(GOLDEN)
+    papers = Papers.parse(seen.start.papers, seen.start.set_id)
+    return (replace(seen.start, versions=collect_versions()),
+            tuple(_measured(record, papers) for record in seen.holes))
+
+
+def record_body(path: Path, start: Start | None = None, holes: tuple[HoleRecord, ...] | None = None,
+                **changes) -> Path:
+    """Write a recording as a run does, judgement included; `changes` are of the stop record."""
+    began, measured = measured_anew()
+    start = start or replace(began, recording_id=path.stem)
+    holes = measured if holes is None else holes
+    recorder = Recorder(path, start)
+    for hole in holes:
+        recorder.write_hole(hole)
+    result = judge_run(Papers.parse(start.papers, start.set_id), start, holes)
+    recorder.finish(Stop(**{"status": "complete", "finished": start.started + 9.0,
+                            "holes": len(holes), "result": result} | changes))
+    return path
+
+
+def _measured(record: HoleRecord, papers: Papers) -> HoleRecord:
+    hole = papers.hole(record.observation.hole_id)
+    attempts = tuple(
+        replace(attempt, outcome=measure_hole(
+            record.observation.first(attempt.views), hole, papers.calibration, papers.job.method,
+            np.radians(papers.job.normal_sigma_deg)))
+        for attempt in record.attempts)
+    return replace(record, attempts=attempts)
