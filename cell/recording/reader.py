@@ -48,7 +48,7 @@ def read(path: Path) -> Recording:
         path, start,
         [record for record in records if isinstance(record, HoleRecord)],
         stop if isinstance(stop, Stop) else None,
-        pages[-1].chain,
+        [page.chain for page in pages if page.record is not None][-1],
         tuple(fault for page in pages for fault in page.faults),
         tuple("the last hole is not whole and is left out" for page in pages
               if page.record is None and not page.faults),

@@ -71,6 +71,14 @@ class Recorder:
         """
         self._hand_over(self._write_hole, record, waiting=WAITING)
 
+    def wait(self) -> None:
+        """Wait until everything handed over is on the disk.
+
+        Raises:
+            RecordingError: something could not be written.
+        """
+        self._settle(0)
+
     def finish(self, stop: Stop) -> None:
         """Write the stop record, wait for the disk, close the file and seal it.
 
@@ -98,6 +106,10 @@ class Recorder:
         self._pending.append(self._thread.submit(self._unless_failed, write, paper))
         if self._live is not None:
             self._live.show(paper)
+        self._settle(waiting)
+
+    def _settle(self, waiting: int) -> None:
+        """Wait until at most `waiting` records are unwritten; raise what failed so far."""
         while self._pending and (len(self._pending) > waiting or self._pending[0].done()):
             self._pending.popleft().result()
 

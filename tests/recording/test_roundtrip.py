@@ -91,8 +91,7 @@ start, holes = pickle.load(sys.stdin.buffer)
 recorder = Recorder(Path(sys.argv[1]), start)
 for hole in holes:
     recorder.write_hole(hole)
-while recorder._pending:
-    recorder._pending.popleft().result()
+recorder.wait()
 os.kill(os.getpid(), 9)
 """
 
