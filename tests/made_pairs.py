@@ -59,7 +59,7 @@ def draw_scene(rng, *, radius=None, tilt_deg=2.0, offset=2.0, form=0.004, finish
     radius = radius or rng.uniform(2.5, 10.0)
     while True:
         lean = np.radians(tilt_deg) * rng.normal(size=2)
-        place = rng.uniform(-1.0, 1.0, 3) * [offset, offset, 2.0]
+        place = rng.uniform(-1.0, 1.0, 3) * [offset, offset, min(offset, 2.0)]
         target = np.array([0.0, 0.0, SENSOR.working_distance]) + place
         if abs(SENSOR.light_plane.distance(target)) < 0.6 * radius:
             break
