@@ -7,9 +7,7 @@ under way is lost; an image that nobody fetches stays in the queue. It ends with
 
 from __future__ import annotations
 
-import ctypes
 import os
-import signal
 import sys
 import time
 from collections import deque
@@ -33,7 +31,7 @@ from cell.sim.render_light import Lamps
 from cell.sim.scene import Board, Sphere, read_scene
 from cell.sim.world import draw_world
 
-DIE_WITH_PARENT = 1       # prctl's PR_SET_PDEATHSIG
+LOOK_SECONDS = 1.0        # between looks whether the parent is still there
 CONNECT_SECONDS = 5.0
 REPORT_SECONDS = 2.0      # without a report for so long the controller has gone
 
@@ -67,11 +65,12 @@ class VirtualCamera:
         self._link.send(("ready", self._world.sensor.camera.image_size))
 
     def run(self) -> None:
-        """Serve until the other end goes."""
-        while True:
+        """Serve until the other end goes: it closes the link, or is no longer the parent."""
+        parent = os.getppid()
+        while os.getppid() == parent:
             sources: list[Any] = [self._link, *([self._feed] if self._feed.connected else [])]
-            due = self._queue[0][0] - time.monotonic() if self._queue else None
-            ready: list[Any] = wait(sources, None if due is None else max(due, 0.0))
+            due = self._queue[0][0] - time.monotonic() if self._queue else LOOK_SECONDS
+            ready: list[Any] = wait(sources, min(max(due, 0.0), LOOK_SECONDS))
             if self._feed in ready:
                 self._follow(self._feed.follow())
             if self._link in ready:
@@ -150,7 +149,6 @@ class VirtualCamera:
 
 def main() -> None:
     """Serve the camera on the socket whose number is the argument, until its parent goes."""
-    ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGTERM)
     cv2.setNumThreads(1)
     link = Connection(int(sys.argv[1]))
     try:
