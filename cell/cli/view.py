@@ -29,7 +29,7 @@ def view(
     """
     from cell.recording.replay import find_hole, photograph, serve, show
 
-    number = 0 if hole is None else find_hole(log, hole)
+    number = find_hole(log, hole)
     if picture is not None:
         picture.write_bytes(photograph(log, number).png)
     elif web:

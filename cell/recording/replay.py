@@ -31,8 +31,9 @@ class Photograph:
     complaints: tuple[str, ...]
 
 
-def find_hole(log: Path, hole_id: str) -> int:
-    """Find the place of a hole on the time line; the last, where it was visited twice.
+def find_hole(log: Path, hole_id: str | None) -> int:
+    """Find the place of a hole on the time line: the last, where it was visited twice; the first
+    place of all for None.
 
     Raises:
         DocumentError: the recording is unreadable, or the hole is not in it.
@@ -40,6 +41,8 @@ def find_hole(log: Path, hole_id: str) -> int:
     found = {row.first(layout.HOLE.record)["observation"]["hole_id"]:
              row.number(layout.HOLE_TIMELINE)
              for row in read_rows(log) if row.path == layout.HOLE.path}
+    if hole_id is None:
+        return 0
     number = found.get(hole_id)
     if number is None:
         raise DocumentError(f"holds no hole {hole_id!r}; it holds {', '.join(found) or 'none'}",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import get_args
 
 from cell.archive.files import read_text
 from cell.archive.sets import CALIBRATION, read_set
@@ -12,10 +13,12 @@ from cell.core.documents.job import JobDocument
 from cell.core.documents.record import Start
 from cell.core.documents.text import parse
 from cell.core.errors import DocumentError
+from cell.metrology.locate import Method
 from cell.programs.audit.folder import FolderAudit, audit_folder
 from cell.programs.audit.question import WhatIf
 from cell.recording.pages import read_pages
 
+METHODS = get_args(Method)
 DAYS = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday")
 
 
@@ -23,7 +26,7 @@ def gather_logs(paths: Sequence[Path]) -> tuple[list[Path], list[FolderAudit]]:
     """Resolve files and folders to recordings; a folder's are audited as a row as well.
 
     Raises:
-        DocumentError: a path does not exist.
+        DocumentError: a path does not exist, or there is no recording in them.
     """
     logs: list[Path] = []
     folders: list[FolderAudit] = []
@@ -36,6 +39,8 @@ def gather_logs(paths: Sequence[Path]) -> tuple[list[Path], list[FolderAudit]]:
             logs.append(path)
         else:
             raise DocumentError("there is no such recording or folder", source=str(path))
+    if not logs:
+        raise DocumentError("no recordings here", source=", ".join(map(str, paths)))
     return list(dict.fromkeys(logs)), folders
 
 
@@ -72,6 +77,8 @@ def read_what_if(calibration: str | None, job: Path | None, method: str | None) 
     Raises:
         DocumentError: one of them is missing, ambiguous or wrong.
     """
+    if method not in (None, *METHODS):
+        raise DocumentError(f"expected {' or '.join(METHODS)}; came {method!r}", place="--method")
     texts: dict[str, str] = {}
     if calibration is not None:
         folder = _set_folder(calibration)
