@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from cell.core.geometry import Array
 from cell.sim.bodies import Bore, Sheet
@@ -111,28 +112,29 @@ def _behind(lens: Lens, lamps: Lamps, cut: Cut, window: Window) -> Light | float
         return DARKNESS * lamps.design.ambient_level
     face = cut.face.deeper(cut.sheet.thickness + behind.gap_mm)
     depth, u, v = face.places(lens.rays.at(*window))
-    light = ring_light(lens, lamps, face, behind.finish)[window] * _lit(cut, lamps, u, v)
+    light = ring_light(lens, lamps, face, behind.finish)[window]
+    light = light * _lit(cut, behind.gap_mm, lamps, u, v)
     if lamps.laser:
-        reached = _passes(cut, u, v, lamps.laser_at)
+        reached = _passes(cut, behind.gap_mm, u, v, lamps.laser_at)
         light += reached * stripe_light(lens, lamps, behind.finish, depth, window)
     return light * textured(behind.finish, u, v)
 
 
-def _lit(cut: Cut, lamps: Lamps, u: Array, v: Array) -> Light:
-    """Return the share of the ring that reaches places on the sheet behind through the hole."""
+def _lit(cut: Cut, gap: float, lamps: Lamps, u: Array, v: Array) -> Light:
+    """Return the share of the ring that reaches places `gap` mm behind the sheet by the hole."""
     across = np.linspace(u.min(), u.max(), SHADOW_NODES)
     down = np.linspace(v.min(), v.max(), SHADOW_NODES)
     nodes = np.meshgrid(across, down)
-    lit = np.mean([_passes(cut, *nodes, led) for led in lamps.leds], axis=0, dtype=np.float32)
+    lit = np.mean([_passes(cut, gap, *nodes, led) for led in lamps.leds], axis=0, dtype=np.float32)
     scale = SHADOW_NODES - 1
     return cv2.remap(lit, (scale * (u - across[0]) / np.ptp(across)).astype(np.float32),
                      (scale * (v - down[0]) / np.ptp(down)).astype(np.float32), cv2.INTER_LINEAR)
 
 
-def _passes(cut: Cut, u: Array, v: Array, lamp: Array) -> Array:
-    """Tell whether light from a lamp (camera frame) gets through the hole to places behind."""
+def _passes(cut: Cut, gap: float, u: Array, v: Array, lamp: Array) -> NDArray[np.bool_]:
+    """Tell whether light from a lamp (camera frame) gets by the hole to places `gap` mm behind."""
     lamp_u, lamp_v, height = cut.face.camera_from_face.inverse @ lamp
-    thickness, gap = cut.sheet.thickness, cut.sheet.behind.gap_mm
-    way = [part / (height + thickness + gap) for part in (gap, thickness + gap)]
+    deep = cut.sheet.thickness + gap
+    way = [part / (height + deep) for part in (gap, deep)]
     rims = [cut.bore.outside(u + part * (lamp_u - u), v + part * (lamp_v - v)) for part in way]
     return np.maximum(*rims) < 0.0

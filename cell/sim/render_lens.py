@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import cv2
 import numpy as np
@@ -18,6 +18,7 @@ from cell.core.observation import Image
 from cell.sim.world import TrueSensor
 
 Light: TypeAlias = NDArray[np.float32]
+Grid: TypeAlias = NDArray[Any]  # of single or double precision
 COARSE = 16   # px between the nodes at which slowly changing light is computed
 FINE = 6      # sub-pixels along each axis where an edge runs through a pixel
 
@@ -29,10 +30,10 @@ class Rays:
     Those of whole images are in single precision: 0.0004 px; those of edges in double.
     """
 
-    x: Array
-    y: Array
+    x: Grid
+    y: Grid
 
-    def along(self, direction: Array) -> Array:
+    def along(self, direction: Array) -> Grid:
         """Return the scalar product (...) of the rays with a vector (3,) of the camera frame."""
         right, down, ahead = (float(part) for part in direction)  # keeps single precision single
         return self.x * right + self.y * down + ahead
@@ -127,10 +128,9 @@ class Lens:
         return (1.0 - self.sensor.design.vignetting * radius2).astype(np.float32)
 
     @cached_property
-    def _slopes(self) -> tuple[Array, ...]:
+    def _slopes(self) -> tuple[Grid, ...]:
         """dx/dcolumn, dx/drow, dy/dcolumn, dy/drow of the rays."""
-        (x_row, x_column), (y_row, y_column) = (np.gradient(part) for part in self._normalised)
-        return x_column, x_row, y_column, y_row
+        return tuple(np.gradient(part, axis=axis) for part in self._normalised for axis in (1, 0))
 
     @cached_property
     def _normalised(self) -> tuple[Array, Array]:
