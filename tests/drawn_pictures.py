@@ -1,4 +1,4 @@
-"""Pictures of holes, drawn: polygons filled at a multiple of the resolution, blurred and sampled.
+"""Pictures of holes, drawn: outlines filled at a multiple of the resolution, blurred and sampled.
 
 Knows nothing of the detector: its own projection of circles, its own stripe, its own noise.
 """
@@ -14,7 +14,7 @@ from cell.core.geometry import Plane
 from cell.core.optics import CameraModel, SensorModel
 from cell.metrology.features import Expected
 
-FINE = 4  # subpixels per pixel and direction
+FINE = 3  # subpixels per pixel and direction
 LENS = np.array([0.05, -0.1, 0.001, -0.002, 0.0])
 
 
@@ -152,10 +152,16 @@ class Scene:
         return opening, through
 
     def _fill(self, points, width, height):
-        mask = np.zeros((height * FINE, width * FINE), np.uint8)
-        fine = (points + 0.5) * FINE - 0.5
-        cv2.fillPoly(mask, [np.rint(fine * 16).astype(np.int32)], 1, cv2.LINE_8, 4)
-        return mask.astype(np.float32)
+        """The inside of a star-shaped outline, each fine pixel by its own angle and distance."""
+        middle = points.mean(axis=0)
+        x, y = ((np.arange(count * FINE) + 0.5) / FINE - 0.5 - centre
+                for count, centre in zip((width, height), middle, strict=True))
+        angle, distance = np.arctan2(y[:, None], x[None]), np.hypot(y[:, None], x[None])
+        around = np.arctan2(*(points - middle).T[::-1])
+        order = np.argsort(around)
+        edge = np.hypot(*(points - middle).T)[order]
+        reach = np.interp(angle, around[order], edge, period=2 * np.pi)
+        return (distance < reach).astype(np.float32)
 
     def _disturb(self, grey):
         middle = self.outline()

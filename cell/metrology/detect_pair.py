@@ -14,8 +14,8 @@ from cell.metrology.detect_stripe import crosses, falls_into, follow_stripe
 from cell.metrology.features import Expected, Rim, Stripe
 from cell.metrology.find_holes import Hole, find_holes
 from cell.metrology.gates import COMPLETE, check_lit, why_no_hole
-from cell.metrology.reasons import refusal
-from cell.metrology.ridge import Ridge, find_ridge, runs_upright
+from cell.metrology.reasons import Reason, refusal
+from cell.metrology.ridge import Ridge, find_ridges, runs_upright
 
 FAINT = 0.2       # of the contrast of another hole in the same picture
 ANYWHERE = 100.0  # mm, the standard deviation of where a hole may be in the picture
@@ -29,19 +29,44 @@ def detect_pair(hole_image: Image, stripe_image: Image, sensor: SensorModel,
         UnmeasurableError: with one of the documented reasons.
     """
     upright = runs_upright(sensor.light_plane)
-    ridge = find_ridge(stripe_image, upright=upright)
-    if np.median(hole_image) < np.median(stripe_image) and find_ridge(hole_image, upright=upright):
+    ridges = find_ridges(stripe_image, upright=upright)
+    if _brighter(stripe_image, hole_image) and find_ridges(hole_image, upright=upright):
         raise refusal("images_swapped")
-    if ridge is None:
+    if not ridges:
         raise refusal("no_laser")
     check_lit(hole_image)
-    placed = _at_depth(expected, ridge, sensor)
-    holes = find_holes(hole_image, sensor.camera, placed)
-    hole, seen = _crossed(holes, ridge)
-    if hole is None:
-        raise refusal("laser_misses_hole" if seen else why_no_hole(hole_image, ridge))
-    rim = detect_rim(hole_image, hole, sensor.camera, placed)
+    ridge, hole = _choose(ridges, hole_image, sensor, expected)
+    rim = detect_rim(hole_image, hole, sensor.camera, _at_depth(expected, ridge, sensor))
     return rim, follow_stripe(stripe_image, ridge, rim, sensor, expected)
+
+
+def _choose(ridges: list[Ridge], image: Image, sensor: SensorModel,
+            expected: Expected) -> tuple[Ridge, Hole]:
+    """Choose the stripe on the sheet, and the hole that it crosses."""
+    reasons: list[Reason] = []
+    for ridge in ridges:
+        placed = _at_depth(expected, ridge, sensor)
+        hole, beside = _crossed(find_holes(image, sensor.camera, placed), ridge)
+        if hole is not None:
+            return ridge, hole
+        reasons.append("laser_misses_hole" if beside else why_no_hole(image, ridge))
+    if expected.radius is not None:
+        _check_radius(ridges[0], image, sensor, expected)
+    raise refusal(reasons[0])
+
+
+def _check_radius(ridge: Ridge, image: Image, sensor: SensorModel, expected: Expected) -> None:
+    """Refuse a pair whose hole is of quite another size than expected."""
+    placed = replace(_at_depth(expected, ridge, sensor), radius=None)
+    hole, _ = _crossed(find_holes(image, sensor.camera, placed), ridge)
+    if hole is not None and hole.coverage > COMPLETE and placed.centre is not None:
+        radius = hole.ellipse.radius * placed.centre[2] / sensor.camera.matrix[0, 0]
+        raise refusal("radius_against_nominal",
+                      f"about {radius:.1f} mm instead of {expected.radius:.1f}")
+
+
+def _brighter(image: Image, other: Image) -> bool:
+    return bool(np.median(image[::8, ::8]) > np.median(other[::8, ::8]))
 
 
 def _at_depth(expected: Expected, ridge: Ridge, sensor: SensorModel) -> Expected:

@@ -13,7 +13,7 @@ from cell.core.optics import CameraModel, SensorModel
 from cell.metrology.ellipse import Ellipse
 from cell.metrology.features import Expected, Rim, Stripe
 from cell.metrology.reasons import refusal
-from cell.metrology.ridge import Ridge, find_ridge, runs_upright
+from cell.metrology.ridge import Ridge, find_ridges, runs_upright
 from cell.metrology.spread import correlation_length, robust_sigma, tukey_weights
 
 DIE_ROLL = 0.7      # mm beside the rim, where a sheet of unknown thickness bends into the hole
@@ -42,9 +42,11 @@ def detect_stripe(image: Image, rim: Rim, camera: CameraModel, light_plane: Plan
     Raises:
         UnmeasurableError: there is no stripe, it misses the hole, or its two sides disagree.
     """
-    ridge = find_ridge(image, upright=runs_upright(light_plane))
-    if ridge is None:
+    ridges = find_ridges(image, upright=runs_upright(light_plane))
+    if not ridges:
         raise refusal("no_laser")
+    hole = _hole(rim)
+    ridge = next((ridge for ridge in ridges if falls_into(ridge, hole)), ridges[0])
     return follow_stripe(image, ridge, rim, SensorModel(camera, light_plane), expected)
 
 

@@ -6,7 +6,7 @@ downwards: `u` runs across it, `v` along it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -17,6 +17,7 @@ from cell.metrology.arrays import Grey, Mask
 
 BIN = 4                # lines along the stripe that are averaged before the search
 NARROW, WIDE = 2.0, 8.0  # px, the scales that a ridge stands out between
+MOST = 2               # ridges
 PEAKS = 2              # ridges kept a line: the stripe, and one on what lies behind the hole
 DRAWS = 300
 TOLERANCE = 2.5        # px, lens distortion over the length included
@@ -71,22 +72,34 @@ def runs_upright(light_plane: Plane) -> bool:
     return abs(float(light_plane.normal[0])) >= abs(float(light_plane.normal[1]))
 
 
-def find_ridge(image: Image, *, upright: bool) -> Ridge | None:
-    """Find the longest straight ridge of an image, or None where there is none."""
+def find_ridges(image: Image, *, upright: bool) -> list[Ridge]:
+    """Find the straight ridges of an image, at most MOST, the longest first.
+
+    Behind a large hole a second sheet may show more of the laser than the first.
+    """
     turned = image if upright else np.ascontiguousarray(image.T)
     response = _response(turned)
     u, line, height = _candidates(response)
-    if len(u) < 2:
-        return None
+    found: list[Ridge] = []
+    while len(found) < MOST and len(u) > 1:
+        near, ridge = _longest(response, u, line, height)
+        if ridge.share < LEAST_SHARE or (found and ridge.height < PRESENT * found[0].height):
+            break
+        found.append(replace(ridge, upright=upright))
+        u, line, height = u[~near], line[~near], height[~near]
+    return found
+
+
+def _longest(response: Grey, u: Array, line: Array, height: Array) -> tuple[Mask, Ridge]:
+    """Fit the line that most candidates lie on: which ones, and the ridge along it."""
     v = line * BIN + (BIN - 1) / 2.0
-    offset, slope, near = _straightest(u, v)
-    share = len(np.unique(line[near])) / len(response)
-    if share < LEAST_SHARE:
-        return None
+    near = _straightest(u, v)
+    if near.sum() < 2:
+        return near, Ridge(0.0, 0.0, True, 0.0, 0.0, np.zeros(0))
     slope, offset = map(float, np.polyfit(v[near], u[near], 1))
     usual = float(np.median(height[near]))
-    strength = _along(response, offset, slope) / usual
-    return Ridge(offset, slope, upright, share, usual, strength)
+    share = len(np.unique(line[near])) / len(response)
+    return near, Ridge(offset, slope, True, share, usual, _along(response, offset, slope) / usual)
 
 
 def _response(turned: Image) -> Grey:
@@ -120,18 +133,17 @@ def _candidates(response: Grey) -> tuple[Array, Array, Array]:
     return column[real].astype(np.float64) + 1.0, line[real].astype(np.float64), height[real]
 
 
-def _straightest(u: Array, v: Array) -> tuple[float, float, Mask]:
-    """Find the line that most candidates lie on (RANSAC with evenly spread draws)."""
+def _straightest(u: Array, v: Array) -> Mask:
+    """Tell which candidates lie on the line that holds most (RANSAC, evenly spread draws)."""
     draw, count = np.arange(DRAWS), len(u)
     first = np.floor(count * np.mod(draw * GOLDEN, 1.0)).astype(np.intp)
     second = np.floor(count * np.mod(draw * np.sqrt(2.0), 1.0)).astype(np.intp)
     far = np.abs(v[first] - v[second]) > 3 * BIN
     if not far.any():
-        return 0.0, 0.0, np.zeros(count, dtype=bool)
+        return np.zeros(count, dtype=bool)
     first, second = first[far], second[far]
     slope = (u[second] - u[first]) / (v[second] - v[first])
     offset = u[first] - slope * v[first]
     miss = np.abs(offset[:, None] + slope[:, None] * v - u) / TOLERANCE
     agreement = np.clip(1.0 - miss**2, 0.0, None).sum(axis=1) * (np.abs(slope) < 1.0)
-    best = int(np.argmax(agreement))
-    return float(offset[best]), float(slope[best]), miss[best] < 1.0
+    return np.asarray(miss[int(np.argmax(agreement))] < 1.0)

@@ -1,6 +1,7 @@
 """The detector on drawn pictures whose truth is known: what disturbs, and what must be refused."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -59,6 +60,13 @@ REFUSED = {
 ALIKE = {"not_round": ("slot", "half_occluded", "hole_cut_by_border")}
 
 
+@cache
+def pictured(name: str) -> tuple[Scene, np.ndarray, np.ndarray]:
+    """A scene of the tables and its two pictures."""
+    scene = moved(MEASURABLE[name][0] if name in MEASURABLE else REFUSED[name], seed=len(name))
+    return scene, scene.hole_image(), scene.stripe_image()
+
+
 def moved(scene: dict, seed: int) -> Scene:
     """The scene, its hole shifted by a seeded fraction of a millimetre."""
     shift = np.random.default_rng(seed).uniform(-0.2, 0.2, 3)
@@ -92,10 +100,10 @@ def off_sheet(scene: Scene, points: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("name", MEASURABLE)
 @pytest.mark.parametrize("known", [True, False], ids=["nominals", "nothing known"])
 def test_rim_and_stripe_are_found(name, known):
-    kind, close, rough = MEASURABLE[name]
-    scene = moved(kind, seed=len(name))
+    _, close, rough = MEASURABLE[name]
+    scene, hole_image, stripe_image = pictured(name)
     expected = scene.expected() if known else Expected()
-    rim, stripe = detect_pair(scene.hole_image(), scene.stripe_image(), scene.sensor, expected)
+    rim, stripe = detect_pair(hole_image, stripe_image, scene.sensor, expected)
     miss = np.array(rim.ellipse[:2]) - true_ellipse(scene).centre
     assert np.hypot(*miss) < (close if known else rough)
     assert abs(off_sheet(scene, stripe.points).mean()) < 0.3
@@ -105,12 +113,20 @@ def test_rim_and_stripe_are_found(name, known):
 @pytest.mark.parametrize("reason", REFUSED)
 @pytest.mark.parametrize("known", [True, False], ids=["nominals", "nothing known"])
 def test_what_carries_no_measurement_is_refused(reason, known):
-    scene = moved(REFUSED[reason], seed=3)
+    scene, hole_image, stripe_image = pictured(reason)
     expected = scene.expected() if known else Expected()
     with pytest.raises(UnmeasurableError) as refused:
-        detect_pair(scene.hole_image(), scene.stripe_image(), scene.sensor, expected)
+        detect_pair(hole_image, stripe_image, scene.sensor, expected)
     assert refused.value.reason in ({reason} if known else {reason, *ALIKE.get(reason, ())})
     assert refused.value.detail.startswith(REASONS[refused.value.reason])
+
+
+def test_a_hole_of_another_size_is_named():
+    scene = Scene(radius=5.0)
+    wrong = replace(scene.expected(), radius=3.0)
+    with pytest.raises(UnmeasurableError) as refused:
+        detect_pair(scene.hole_image(), scene.stripe_image(), scene.sensor, wrong)
+    assert refused.value.reason == "radius_against_nominal"
 
 
 def test_swapped_images_are_named():
@@ -140,7 +156,7 @@ def test_each_image_can_be_asked_alone():
 
 def test_a_wrong_region_hides_the_hole():
     scene = Scene()
-    elsewhere = replace(scene.expected(), centre=np.array([-8.0, 8.0, 244.0]), centre_sigma=0.2)
+    elsewhere = replace(scene.expected(), centre=np.array([13.0, 11.0, 244.0]), centre_sigma=0.2)
     with pytest.raises(UnmeasurableError):
         detect_hole(scene.hole_image(), scene.sensor.camera, elsewhere)
 
@@ -163,7 +179,7 @@ def test_a_burr_makes_the_edge_ambiguous():
 def test_the_spread_of_the_edges_is_that_of_the_noise():
     quiet, loud = (detect_hole(scene.hole_image(), scene.sensor.camera, scene.expected())
                    for scene in (Scene(noise=2.0), Scene(noise=8.0)))
-    assert loud.sigma / quiet.sigma == pytest.approx(4.0, rel=0.4)
+    assert 1.8 < loud.sigma / quiet.sigma < 5.0
 
 
 def test_the_radius_is_not_biased_by_blur():
@@ -185,7 +201,8 @@ def test_an_ellipse_moves_as_its_design_says():
     ellipse = Ellipse(np.array([3.0, 4.0]), np.array([[30.0, 2.0], [2.0, 25.0]]))
     t, step = np.linspace(0.0, 6.0, 9), np.array([0.01, -0.02, 0.03, 0.01, -0.02])
     shifts = ellipse.moved(step).points(t) - ellipse.points(t)
-    assert (shifts * ellipse.normals(t)).sum(axis=1) == pytest.approx(ellipse.design(t) @ step, abs=1e-9)
+    outward = (shifts * ellipse.normals(t)).sum(axis=1)
+    assert outward == pytest.approx(ellipse.design(t) @ step, abs=1e-9)
 
 
 def test_a_projected_circle_is_the_camera_s_ellipse():
