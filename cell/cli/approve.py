@@ -37,4 +37,4 @@ def approve(job: Path = typer.Argument(..., help="The job's file, jobs/JOB.yaml.
     if as_json:
         print_json(answer)
     else:
-        answers.print("\n".join(said), highlight=False)
+        answers.print("\n".join(said), highlight=False, soft_wrap=True)

@@ -139,32 +139,33 @@ def _seconds(moment: datetime | None) -> float | None:
 
 
 def _print_bodies(rows: list[dict[str, Any]]) -> None:
-    from rich.table import Table
-
     from cell.programs.results import utc
 
-    table = Table("started", "body", "job", "verdict", "holes", "out", "missing", "worst mm", "")
-    for row in rows:
-        table.add_row(utc(row["started"]), row["body_id"], row["job"],
-                      row["verdict"].replace("_", " "), str(row["measured"]),
-                      str(row["out_of_tolerance"]), str(row["missing"]), _number(row["worst"]),
-                      " ".join(word for word, on in (("TRIAL", row["trial"]),
-                                                     (row["status"], row["status"] != "complete"))
-                               if on))
-    answers.print(table)
+    _print_columns([("started", "body", "job", "verdict", "measured", "out", "missing", "worst mm",
+                     "")] + [
+        (utc(row["started"]), row["body_id"], row["job"], row["verdict"].replace("_", " "),
+         str(row["measured"]), str(row["out_of_tolerance"]), str(row["missing"]),
+         _number(row["worst"]), _remarks(row)) for row in rows])
+
+
+def _remarks(row: dict[str, Any]) -> str:
+    status = row["status"] if row["status"] != "complete" else ""
+    return " ".join(word for word in ("TRIAL" if row["trial"] else "", status) if word)
 
 
 def _print_axes(rows: list[dict[str, Any]]) -> None:
-    from rich.table import Table
+    numbers = ("nominal", "measured", "deviation", "tolerance", "uncertainty")
+    _print_columns([("hole", "axis", *numbers[:4], "u (k=1)", "verdict")] + [
+        (row["feature"], row["axis"] or "", *(_number(row[name]) for name in numbers),
+         row["reason"] or (row["verdict"] or "").replace("_", " ")) for row in rows])
 
-    table = Table("hole", "axis", "nominal", "measured", "deviation", "tolerance", "u (k=1)",
-                  "verdict")
+
+def _print_columns(rows: list[tuple[str, ...]]) -> None:
+    """Print rows below each other, columns as wide as their widest entry; nothing is cut off."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
-        verdict = row["reason"] or (row["verdict"] or "").replace("_", " ")
-        table.add_row(row["feature"], row["axis"] or "",
-                      *(_number(row[name]) for name in ("nominal", "measured", "deviation",
-                                                        "tolerance", "uncertainty")), verdict)
-    answers.print(table)
+        line = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+        answers.print(line.rstrip(), highlight=False, soft_wrap=True, markup=False)
 
 
 def _number(value: float | None) -> str:
