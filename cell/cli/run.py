@@ -116,10 +116,12 @@ def _feature_as_json(feature: Feature) -> dict[str, Any]:
 
 
 def _print_table(finished: Finished) -> None:
-    table = Table(title=f"Body {finished.body_id}", title_justify="left", header_style="bold")
+    table = Table(title=f"Body {finished.body_id}", title_justify="left", header_style="bold",
+                  caption="mm; U is the largest expanded uncertainty (k = 2)",
+                  caption_justify="left")
     for name in ("hole", "verdict"):
-        table.add_column(name)
-    for name in ("dx", "dy", "dz", "dd", "largest U", "position"):
+        table.add_column(name, no_wrap=True)
+    for name in ("dx", "dy", "dz", "dd", "U", "position"):
         table.add_column(name, justify="right")
     for feature in finished.result.features:
         table.add_row(feature.id, _words(feature), *_deviations(feature), _largest_u(feature),

@@ -39,8 +39,7 @@ class Station:
     world: SimulatedCamera | None = None
 
     def pause(self, seconds: float, since: float) -> None:
-        """Wait until `seconds` of the cell's own time have passed since `time.monotonic()` was so.
-        """
+        """Wait until `seconds` of the cell's time have passed after the monotonic time `since`."""
         time.sleep(max(0.0, since + seconds / self.speed - time.monotonic()))
 
     def make_safe(self) -> None:

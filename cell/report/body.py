@@ -85,7 +85,7 @@ def _rows(feature: Feature) -> list[Row]:
 
 def _counts(result: BodyResult | None) -> dict[str, int]:
     verdicts = [feature.verdict for feature in result.features] if result else []
-    return {words: verdicts.count(code)  # type: ignore[arg-type]
+    return {words: verdicts.count(code)
             for code, words in VERDICTS.items() if code in verdicts}
 
 
