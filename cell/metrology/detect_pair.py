@@ -48,15 +48,18 @@ def _choose(ridges: list[Ridge], image: Image, sensor: SensorModel,
         placed = _at_depth(expected, ridge, sensor)
         hole, beside = _crossed(find_holes(image, sensor.camera, placed), ridge)
         if hole is not None:
+            if hole.coverage < COMPLETE:
+                _check_radius(ridge, image, sensor, expected)
             return ridge, hole
         reasons.append("laser_misses_hole" if beside else why_no_hole(image, ridge))
-    if expected.radius is not None:
-        _check_radius(ridges[0], image, sensor, expected)
+    _check_radius(ridges[0], image, sensor, expected)
     raise refusal(reasons[0])
 
 
 def _check_radius(ridge: Ridge, image: Image, sensor: SensorModel, expected: Expected) -> None:
-    """Refuse a pair whose hole is of quite another size than expected."""
+    """Refuse a pair whose hole is whole, but of quite another size than expected."""
+    if expected.radius is None:
+        return
     placed = replace(_at_depth(expected, ridge, sensor), radius=None)
     hole, _ = _crossed(find_holes(image, sensor.camera, placed), ridge)
     if hole is not None and hole.coverage > COMPLETE and placed.centre is not None:

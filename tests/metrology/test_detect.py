@@ -52,7 +52,7 @@ REFUSED = {
     "hole_cut_by_border": {"centre": (1.0, 10.5, 244.0)},
     "too_dark": {"plate": 6.0, "behind": 4.0, "wall": 4.0, "noise": 2.0},
     "saturated": {"plate": 600.0, "behind": 400.0, "wall": 400.0},
-    "blurred": {"blur": 4.5},
+    "blurred": {"blur": 6.0},
     "stripe_segments_disagree": {"stripe_step": 0.8},
 }
 
