@@ -30,6 +30,8 @@ def run(
                                                     "than real time."),
     truth: Path | None = typer.Option(None, help="After the run, write what the simulator knows "
                                                  "to this file (simulated cells only)."),
+    live: bool = typer.Option(False, "--live", help="Show the run in a viewer that listens on this "
+                                                    "machine: `cell view --live`."),
     part_temperature: float | None = typer.Option(
         None, min=-40.0, max=80.0, help="The body's temperature in degrees C, where the job scales "
                                         "to 20; the job's own unless given."),
@@ -48,7 +50,7 @@ def run(
 
     signal.signal(signal.SIGTERM, _interrupt)
     with _Progress() as progress:
-        request = Request(job, cell, body, logs, speed, truth, part_temperature)
+        request = Request(job, cell, body, logs, speed, truth, part_temperature, live)
         finished = run_job(request, progress.advance)
     if as_json:
         print_json(_as_json(finished))

@@ -6,6 +6,7 @@ import json
 import secrets
 import time
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -18,6 +19,7 @@ from cell.programs.inspection import BodyInspection, Prepared, Watch, prepare
 from cell.programs.report import write_page
 from cell.programs.station import Station, open_station
 from cell.recording import Recorder, collect_versions
+from cell.recording.live import LiveView
 from cell.report.body import BodyRun, body_report
 
 
@@ -32,6 +34,7 @@ class Request:
     speed: float = 1.0
     truth: Path | None = None
     part_temperature_c: float | None = None
+    live: bool = False
 
     @property
     def conditions(self) -> dict[str, float]:
@@ -66,10 +69,11 @@ def run_job(request: Request, watch: Watch) -> Finished:
     log = new_log(request.logs, prepared.papers.job.name)
     body_id = request.body_id or f"{prepared.papers.job.name}-{secrets.token_hex(4)}"
     watch(0, len(prepared.stops), "opening the cell")
-    with open_station(prepared.papers.station, prepared.folder, request.speed) as station:
+    with (open_station(prepared.papers.station, prepared.folder, request.speed) as station,
+          LiveView() if request.live else nullcontext() as live):
         prepared.check_identity(station.identity)
         start = begin(prepared, station, body_id, log.stem, conditions=request.conditions)
-        inspection = BodyInspection(station, prepared, start, Recorder(log, start), watch)
+        inspection = BodyInspection(station, prepared, start, Recorder(log, start, live), watch)
         status = measure(inspection)
         if request.truth is not None and station.world is not None:
             _write_truth(request.truth, station, body_id)
