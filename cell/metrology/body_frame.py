@@ -1,6 +1,7 @@
 """From the camera to the body: where a plan's hole is expected, and where a located one lies.
 
-`body_from_base @ base_from_flange @ flange_from_camera`, from the flange as reached. Each of the
+`body_from_base @ base_from_flange @ flange_from_camera`, from the flange as reached, which is as
+reported, corrected by the arm's kinematics where the calibration set has them. Each of the
 three is known with an uncertainty: a small turn about the origin of the frame that is placed, and a
 shift of that origin (R' = exp(turn) R, t' = t + shift).
 """
@@ -10,20 +11,27 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cell.core.documents.calibration import Calibration
+from cell.core.documents.calibration import Calibration, KinematicsDocument
 from cell.core.documents.nominals import Hole
 from cell.core.geometry import Array, Transform
 from cell.core.observation import View
+from cell.metrology.arm_correction import correct_flange
 from cell.metrology.features import Expected
 from cell.metrology.uncertainty import Budget
 
 
-def reached(view: View) -> Transform:
-    """Average the flange poses (`base_from_flange`) before and after an exposure."""
+def reached(view: View, kinematics: KinematicsDocument | None = None) -> Transform:
+    """Average the flange poses before and after an exposure, put right by the arm's kinematics.
+
+    Returns:
+        base_from_flange; as the controller reports it where there are no `kinematics`.
+    """
     before, after = view.base_from_flange_before, view.base_from_flange_after
     between = (before.inverse @ after).rotation_vector
     halfway = before @ Transform.from_parts(between / 2.0, np.zeros(3))
-    return Transform.from_parts(halfway.rotation, (before.translation + after.translation) / 2.0)
+    reported = Transform.from_parts(halfway.rotation,
+                                    (before.translation + after.translation) / 2.0)
+    return correct_flange(reported, view.joints, kinematics)
 
 
 def expect(hole: Hole, camera_from_plan: Transform, normal_sigma: float) -> Expected:
@@ -56,12 +64,11 @@ def _way_budget(centre_in_camera: Array, base_from_flange: Transform,
     centre_in_flange = calibration.flange_from_camera @ centre_in_camera
     arm = base_from_flange.turn(centre_in_flange)
     in_body = calibration.body_from_camera(base_from_flange) @ centre_in_camera
-    repeatability = [np.radians(hand_eye.robot_repeatability_deg)] * 3 \
-        + [hand_eye.robot_repeatability_mm] * 3
+    millimetres, radians = calibration.flange_sigmas
     causes = {
         "hand_eye": (calibration.flange_from_camera.turn(centre_in_camera),
                      body_from_base @ base_from_flange.rotation, hand_eye.covariance),
-        "robot": (arm, body_from_base, np.diag(np.square(repeatability))),
+        "robot": (arm, body_from_base, np.diag(np.square([radians] * 3 + [millimetres] * 3))),
         "registration": (base_from_body.turn(in_body), body_from_base, calibration.body.covariance),
     }
     return {source: _placed(lever, turn, covariance)

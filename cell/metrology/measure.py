@@ -56,7 +56,7 @@ def _locate(sightings: list[Sighting], calibration: Calibration,
 
 def _in_body(located: Located, two_step: Located, reference: Sighting, hole: Hole,
              calibration: Calibration) -> Measured:
-    base_from_flange = reached(reference.ring)
+    base_from_flange = reached(reference.ring, calibration.kinematics)
     body_from_camera = calibration.body_from_camera(base_from_flange)
     budget = body_budget(located.sources, located.centre, base_from_flange, calibration)
     if hole.side == "back":

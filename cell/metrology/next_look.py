@@ -119,7 +119,8 @@ def _towards_hole(observation: Observation, hole: Hole, calibration: Calibration
     """
     sensor = calibration.sensor.model
     ring = [view for view in observation.views if view.light == "ring"][-1]
-    camera_from_body = calibration.body_from_camera(reached(ring)).inverse
+    camera_from_body = calibration.body_from_camera(
+        reached(ring, calibration.kinematics)).inverse
     camera_from_plan = camera_from_body @ observation.body_from_predicted
     centre = camera_from_plan @ hole.centre_on_seen_face
     with suppress(UnmeasurableError):

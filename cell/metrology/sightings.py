@@ -67,7 +67,8 @@ def _see(observation: Observation, attempt: int, hole: Hole, calibration: Calibr
     if not lasers:
         raise refusal("no_laser", "there is no view with the laser")
     _check_still(ring, lasers[0])
-    camera_from_body = calibration.body_from_camera(reached(ring)).inverse
+    camera_from_body = calibration.body_from_camera(
+        reached(ring, calibration.kinematics)).inverse
     expected = expect(hole, camera_from_body @ observation.body_from_predicted, normal_sigma)
     rim, stripe = detect_pair(ring.image, lasers[0].image, calibration.sensor.model, expected)
     return Sighting(index, ring, lasers[0], tuple(lasers[1:]), rim, stripe, expected)
@@ -127,7 +128,9 @@ def _strays(sighting: Sighting, shots: list[Shot], calibration: Calibration,
 def _camera_from(ring: View, laser: View, calibration: Calibration) -> Transform:
     """`camera_from_stripe_camera`, by the reached flange poses."""
     flange_from_camera = calibration.flange_from_camera
-    moved = reached(ring).inverse @ reached(laser)
+    base_from_ring, base_from_laser = (reached(view, calibration.kinematics)
+                                       for view in (ring, laser))
+    moved = base_from_ring.inverse @ base_from_laser
     return flange_from_camera.inverse @ moved @ flange_from_camera
 
 
@@ -140,5 +143,5 @@ def _loosened(stripe: Stripe, calibration: Calibration) -> Stripe:
     sensor = calibration.sensor.model
     px_per_mm = sensor.camera.matrix[0, 0] * np.tan(sensor.triangulation_angle) \
         / sensor.working_distance
-    way = np.sqrt(2.0) * calibration.hand_eye.robot_repeatability_mm
+    way = np.sqrt(2.0) * calibration.flange_sigmas[0]
     return replace(stripe, bias=float(np.hypot(stripe.bias, way * px_per_mm)))

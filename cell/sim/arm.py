@@ -31,6 +31,11 @@ class TrueArm:
         self._moved_at = LONG_AGO
         self._standstill = np.zeros(6)
 
+    @property
+    def warm(self) -> Arm:
+        """The arm as it truly is, hysteresis and chance aside, once it is warm."""
+        return self._true
+
     def follow(self, joints: Array, time: float) -> None:
         """Take note of the joints (6,) in rad that the controller reports at `time` s."""
         self._moved_at = min(self._moved_at, time)  # a controller that restarts counts from 0

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, TypeAlias
+from typing import Annotated, Self, TypeAlias
 
 import numpy as np
-from pydantic import AfterValidator, Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from cell.core.documents.base import Document, Matrix3, Matrix4, Number, Vector4, Vector6
 from cell.core.geometry import Array, Plane, Transform
@@ -126,8 +126,13 @@ class BodyDocument(Document):
 
 
 class KinematicsDocument(Document):
-    """`kinematics.yaml`: how the arm's Denavit-Hartenberg rows differ from the published ones, as
-    estimated from board views (mm, rad). Used for measuring only, never sent to the controller.
+    """`kinematics.yaml`: how the arm's Denavit-Hartenberg rows differ from those that its
+    controller reckons with, as estimated from board views (mm, rad), to be put on the published
+    rows. Used for measuring only, never sent to the controller.
+
+    `remaining_mm` and `remaining_deg` are the standard uncertainties per axis of a flange pose so
+    corrected; where given they stand for the hand-eye's `robot_repeatability_*`. Hand-eye and body
+    registration of a set with such a document are found with corrected poses too.
     """
 
     model: str
@@ -135,6 +140,19 @@ class KinematicsDocument(Document):
     d: Vector6
     alpha: Vector6
     theta: Vector6
+    remaining_mm: NotNegative | None = None
+    remaining_deg: NotNegative | None = None
+
+    @model_validator(mode="after")
+    def _says_both_or_neither(self) -> Self:
+        if (self.remaining_mm is None) != (self.remaining_deg is None):
+            raise ValueError("expected `remaining_mm` and `remaining_deg`, or neither")
+        return self
+
+    @property
+    def is_nominal(self) -> bool:
+        """Whether it corrects nothing."""
+        return not any((*self.a, *self.d, *self.alpha, *self.theta))
 
 
 class ActiveDocument(Document):
@@ -166,6 +184,15 @@ class Calibration:
     def base_from_body(self) -> Transform:
         """The body registration."""
         return Transform(np.array(self.body.base_from_body))
+
+    @property
+    def flange_sigmas(self) -> tuple[float, float]:
+        """Standard uncertainties of a reached flange pose per axis: mm, rad."""
+        left = self.kinematics
+        if left and left.remaining_mm is not None and left.remaining_deg is not None:
+            return left.remaining_mm, float(np.radians(left.remaining_deg))
+        hand_eye = self.hand_eye
+        return hand_eye.robot_repeatability_mm, float(np.radians(hand_eye.robot_repeatability_deg))
 
     def body_from_camera(self, base_from_flange: Transform) -> Transform:
         """Chain the frames from the reached flange pose."""
