@@ -135,6 +135,9 @@ def _print(located: Located) -> None:
 
 
 def _draw(path: Path, images: list[Image], outcome: Outcome) -> None:
-    from cell.report.picture import draw_pair  # type: ignore[import-untyped]
+    from cell.report.picture import draw_pair
 
-    draw_pair(path, images[0], images[1], outcome)
+    try:
+        path.write_bytes(draw_pair(images[0], images[1], outcome))
+    except OSError as error:
+        raise DocumentError(f"cannot be written: {error.strerror}", source=str(path)) from None
