@@ -1,5 +1,6 @@
 """A shift on the demo's virtual cell, with a short job and a hand on its faults."""
 
+import json
 import socket
 
 from made_workplace import Workplace
@@ -38,10 +39,17 @@ class Cause:
             self.struck.append(fault)
             fault() if callable(fault) else self.tell(fault)
 
+    def truth(self):
+        return json.loads(self._ask("truth"))
+
     def tell(self, command):
+        assert self._ask(command) == "ok"
+
+    def _ask(self, command):
         with socket.create_connection((self.address, REFEREE_PORT), timeout=5.0) as link:
             link.sendall(command.encode() + b"\n")
-            assert link.makefile().readline().strip() == "ok"
+            with link.makefile() as answers:
+                return answers.readline().strip()
 
 
 def short_shift(folder, number, holes=("BP5", "BP1", "BP3"), more=""):

@@ -110,12 +110,15 @@ def export_results(to: Path = typer.Argument(..., help="The CSV file; - writes t
 
 @results_app.command("rebuild")
 def rebuild_results(logs: Path = LOGS, database: str | None = URL, as_json: bool = JSON) -> None:
-    """Make the rows of all recordings again. Approvals, faults and bypasses stay as they are."""
+    """Make the rows of all recordings again, also after a change of the schema. Approvals, visits,
+    faults and bypasses stay as they are.
+    """
     from rich.progress import Progress
 
     from cell.programs.results import opened, rebuild
 
-    with opened(logs, database) as found, Progress(console=console, transient=True) as progress:
+    with opened(logs, database, any_schema=True) as found, \
+            Progress(console=console, transient=True) as progress:
         task = progress.add_task("recordings", total=None)
         troubles = rebuild(found, logs, lambda done, of: progress.update(task, completed=done,
                                                                          total=of))

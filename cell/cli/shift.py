@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from cell.cli.words import answers, console, print_json
+from cell.core.errors import INTERRUPTED
 
 if TYPE_CHECKING:
     from cell.programs.shift.board import Board
 
+NOT_BOOKED = 4
 
 def shift(file: Path | None = typer.Argument(None, help="The shift's file, jobs/SHIFT.yaml."),
           simulate: bool = typer.Option(False, "--simulate", help="A virtual line brings virtual "
@@ -44,16 +46,18 @@ def shift(file: Path | None = typer.Argument(None, help="The shift's file, jobs/
         return
     if file is None:
         raise typer.BadParameter("which shift? give its file", param_hint="FILE")
-    answer = _report_only(file, logs) if report else _run(file, simulate, bodies, speed, logs)
+    answer, code = (_report_only(file, logs), 0) if report else \
+        _run(file, simulate, bodies, speed, logs)
     if as_json:
         print_json(answer)
     else:
         answers.print("\n".join(f"{key:<12} {value}" for key, value in answer.items()),
                       highlight=False, soft_wrap=True)
+    raise typer.Exit(code)
 
 
 def _run(file: Path, simulate: bool, bodies: int | None, speed: float,
-         logs: Path) -> dict[str, Any]:
+         logs: Path) -> tuple[dict[str, Any], int]:
     from cell.programs.shift.report import write_shift_report
     from cell.programs.shift.run import ShiftRequest, run_shift
 
@@ -62,8 +66,10 @@ def _run(file: Path, simulate: bool, bodies: int | None, speed: float,
     with _screen() as show:
         done = run_shift(ShiftRequest(file, logs, simulate, bodies, speed, typed), show, _tell)
     written = write_shift_report(logs, done.document, done.began, done.ended)
-    return {"shift": done.document.name, "bodies": done.bodies, "booked": done.all_booked,
-            "report": str(written.html), "csv": str(written.csv)}
+    answer = {"shift": done.document.name, "bodies": done.bodies, "booked": done.all_booked,
+              "report": str(written.html), "csv": str(written.csv)}
+    unbooked = 0 if done.all_booked else NOT_BOOKED
+    return answer, INTERRUPTED if done.interrupted else unbooked
 
 
 def _report_only(file: Path, logs: Path) -> dict[str, Any]:

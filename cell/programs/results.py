@@ -18,7 +18,7 @@ from cell.core.errors import DocumentError
 from cell.metrology.decide import judge_run
 from cell.recording.pages import PRUNED, Page, read_pages
 from cell.results.booking import BodyRows, Booking, Row, body_rows, book
-from cell.results.database import Database, open_database, recreate_results
+from cell.results.database import Database, connect, open_database, recreate_results
 from cell.results.tables import bodies
 
 FILE = "results.sqlite"
@@ -29,11 +29,11 @@ COLUMNS = ("body_id", "recording_id", "time_utc", "job", "cell", "set_id", "tria
 
 
 @contextmanager
-def opened(logs: Path, url: str | None = None) -> Iterator[Database]:
+def opened(logs: Path, url: str | None = None, *, any_schema: bool = False) -> Iterator[Database]:
     """Open the database at `url`, or the cell's own beside its recordings; close it afterwards."""
     if url is None and not logs.is_dir():
         raise DocumentError("there is no such folder of recordings", source=str(logs))
-    database = open_database(url or logs / FILE)
+    database = (connect if any_schema else open_database)(url or logs / FILE)
     try:
         yield database
     finally:

@@ -7,7 +7,17 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Connection, Engine, create_engine, event, insert, inspect, select
+from sqlalchemy import (
+    Connection,
+    Engine,
+    MetaData,
+    Table,
+    create_engine,
+    event,
+    insert,
+    inspect,
+    select,
+)
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import (
     ArgumentError,
@@ -19,7 +29,7 @@ from sqlalchemy.exc import (
 )
 
 from cell.core.errors import CellError, DocumentError
-from cell.results.tables import RESULTS, SCHEMA, meta, metadata
+from cell.results.tables import RECORDS, SCHEMA, meta, metadata
 
 WAIT = 5.0
 """Seconds that a statement waits for another writer, and a connection for its server."""
@@ -100,19 +110,51 @@ def prepare(connection: Connection, source: str) -> None:
     Raises:
         DocumentError: the schema is another one.
     """
-    if not inspect(connection).has_table(meta.name):
+    found = _schema(connection)
+    if found is None:
         metadata.create_all(connection)
         connection.execute(insert(meta).values(schema=SCHEMA))
-    found = connection.execute(select(meta.c.schema)).scalar_one()
-    if found != SCHEMA:
-        raise DocumentError(f"has schema {found}, this program writes {SCHEMA}: open a new "
-                            "database and run `cell results rebuild`", source=source)
+    elif found != SCHEMA:
+        raise DocumentError(f"has schema {found}; this program writes {SCHEMA}: run "
+                            "`cell results rebuild`", source=source)
 
 
 def recreate_results(connection: Connection) -> None:
-    """Drop and create the tables that are made from recordings."""
-    metadata.drop_all(connection, tables=RESULTS)
+    """Empty the tables that are made from recordings; bring those of an older schema to this one,
+    with the records that no recording holds.
+
+    Raises:
+        DocumentError: the schema is newer than this program.
+    """
+    found = _schema(connection)
+    if found is not None and found > SCHEMA:
+        raise DocumentError(f"the database has schema {found}, this program writes {SCHEMA}: "
+                            "install a newer one")
+    kept = {table: _rows_as_they_are(connection, table) for table in RECORDS}
+    there = MetaData()
+    there.reflect(connection)
+    there.drop_all(connection, [table for name, table in there.tables.items()
+                                if name in metadata.tables])
     metadata.create_all(connection)
+    connection.execute(insert(meta).values(schema=SCHEMA))
+    for table, rows in kept.items():
+        if rows:
+            connection.execute(insert(table), rows)
+
+
+def _rows_as_they_are(connection: Connection, table: Table) -> list[dict[str, Any]]:
+    """Read the columns that the table has here and has always had."""
+    if not inspect(connection).has_table(table.name):
+        return []
+    names = {column["name"] for column in inspect(connection).get_columns(table.name)}
+    columns = [column for column in table.columns if column.name in names]
+    return [dict(row) for row in connection.execute(select(*columns)).mappings()]
+
+
+def _schema(connection: Connection) -> int | None:
+    if not inspect(connection).has_table(meta.name):
+        return None
+    return connection.execute(select(meta.c.schema)).scalar_one()
 
 
 def _engine(url: str) -> Engine:

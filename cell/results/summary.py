@@ -55,7 +55,7 @@ def calibrations_used(database: Database, window: Window) -> list[Row]:
     """List the calibrations that bodies were measured with."""
     query = (select(calibrations, func.count().label("bodies"))
              .join(bodies, bodies.c.calibration == calibrations.c.hash)
-             .where(window.condition).group_by(calibrations).order_by(calibrations.c.first_used))
+             .where(window.condition).group_by(*calibrations.columns).order_by(calibrations.c.first_used))
     with database.transaction() as connection:
         return [dict(row) for row in connection.execute(query).mappings()]
 

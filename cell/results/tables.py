@@ -121,5 +121,5 @@ notices = Table(
     _words("cell"), _words("shift"), Column("at", Float, nullable=False), _words("kind"),
     Column("detail", Text, nullable=False))
 
-RESULTS = (bodies, features, axes)
-"""What `rebuild` makes again from the recordings."""
+RECORDS = (approvals, visits, faults, bypasses, notices)
+"""What no recording holds: it stays through a rebuild."""

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import pytest
 from made_bodies import booking_of
-from sqlalchemy import func, insert, select, update
+from sqlalchemy import func, insert, select, text, update
 
 from cell.core.errors import DocumentError
 from cell.results.approvals import approve, approved, list_approvals, withdraw
 from cell.results.booking import body_rows, book, hash_texts
 from cell.results.database import DatabaseError, open_database, recreate_results
 from cell.results.query import Filter, export_rows, list_bodies, show_body, trend
-from cell.results.tables import axes, bodies, calibrations, features, meta
+from cell.results.tables import approvals, axes, bodies, calibrations, features, meta
 
 
 def _book(database, *bookings):
@@ -117,6 +117,29 @@ def test_another_schema_is_refused_with_what_to_do(url, database):
         connection.execute(update(meta).values(schema=99))
     with pytest.raises(DocumentError, match="cell results rebuild"):
         open_database(url)
+
+
+def test_an_older_schema_is_brought_to_this_one_with_its_records(database):
+    approve(database, [_approval("a" * 64)])
+    _book(database, booking_of(1))
+    with database.transaction() as connection:
+        connection.execute(update(meta).values(schema=0))
+        connection.execute(text("ALTER TABLE approvals DROP COLUMN withdrawn_at"))
+        connection.execute(text("ALTER TABLE bodies ADD COLUMN forgotten INTEGER"))
+        recreate_results(connection)
+    _book(database, booking_of(1))
+    assert approved(database, ["a" * 64]) and _counts(database)[0] == 1
+    with database.transaction() as connection:
+        assert connection.execute(select(meta.c.schema)).scalar_one() == 1
+
+
+def test_a_newer_schema_is_left_alone(database):
+    approve(database, [_approval("a" * 64)])
+    with database.transaction() as connection:
+        connection.execute(update(meta).values(schema=99))
+    with pytest.raises(DocumentError, match="newer"), database.transaction() as connection:
+        recreate_results(connection)
+    assert _count(database, approvals) == 1
 
 
 def test_recreating_keeps_the_records_that_no_recording_holds(database):

@@ -41,7 +41,7 @@ class Takt(Document):
 
 class MasterCheck(Document):
     """The master body, which comes as type `type` at the start and after every `every` bodies. Its
-    holes are compared with what a CMM measured there, or with the nominals, to `limit_mm`.
+    holes are compared with what a CMM measured on it, or else with the nominals, to `limit_mm`.
     """
 
     type: TypeNumber

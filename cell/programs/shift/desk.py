@@ -25,7 +25,7 @@ class Desk:
         self.document, self.line, self.ledger, self.clock = document, line, ledger, clock
         self.board = Board(document.name)
         self.bypass: Row | None = ledger.current_bypass()
-        self.stopping = False
+        self.stopping = self.interrupted = False
         self._show = show
 
     def update(self, **changes: Any) -> None:  # noqa: ANN401  the fields of a Board
@@ -34,6 +34,10 @@ class Desk:
                              bypass=str(self.bypass["reason"]) if self.bypass else "", **changes)
         self.line.show(self.board.status)
         self._show(self.board)
+
+    def interrupt(self) -> None:
+        """End the shift now: a person at the terminal says so."""
+        self.stopping = self.interrupted = True
 
     def add_to_strip(self, visit: Row) -> None:
         """Show a body's verdict among the last ones."""

@@ -62,7 +62,7 @@ class Shift:
                 if order is not None:
                     self._guarded(self._follow, order)
         except KeyboardInterrupt:
-            desk.stopping = True
+            desk.interrupt()
         finally:
             self._cell.make_safe()
             desk.update(state="stopped", instruction="", busy=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cell.core.documents.result import BodyResult, Feature
+from cell.core.documents.result import BodyResult
 
 
 @dataclass(frozen=True)
@@ -24,16 +24,13 @@ class MasterFinding:
 
 
 def judge_master(result: BodyResult | None, limit: float) -> MasterFinding:
-    """Judge a master: every hole measured, and nothing further than `limit` mm from its reference
-    (what the CMM measured, or else the nominal).
+    """Judge a master: every hole measured, and nothing further than `limit` mm from what a CMM
+    measured on it; from the nominals where no CMM has measured any hole.
     """
     features = result.features if result else ()
+    known = any(feature.bias for feature in features)
     missing = tuple(feature.id for feature in features if feature.verdict == "not_measured")
     errors = [(abs(error), f"{feature.id}.{axis}") for feature in features
-              for axis, error in _errors(feature).items()]
+              for axis, error in (feature.bias if known else feature.deviation or {}).items()]
     worst, where = max(errors, default=(float("inf"), "no hole"))
     return MasterFinding(worst <= limit and not missing, worst, where, missing)
-
-
-def _errors(feature: Feature) -> dict[str, float]:
-    return feature.bias or feature.deviation or {}

@@ -93,7 +93,7 @@ class Measuring:
             except BodyAbortedError as aborted:
                 return inspection.finish("aborted", str(aborted))  # between holes it stands
             except KeyboardInterrupt:
-                self._desk.stopping = True
+                self._desk.interrupt()
                 return inspection.abandon("interrupted", "stopped by a person")
             except DeviceError as error:
                 if not stand(self._desk, self._cell, fault_of(error), str(error), visit):

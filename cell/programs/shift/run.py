@@ -52,13 +52,16 @@ class ShiftRequest:
 
 @dataclass(frozen=True)
 class ShiftDone:
-    """What became of a shift: the bodies measured, and whether all of them are booked."""
+    """What became of a shift: the bodies that passed, whether all are booked, and whether a person
+    broke it off at the terminal.
+    """
 
     document: ShiftDocument
     began: float
     ended: float
     bodies: int
     all_booked: bool
+    interrupted: bool = False
 
 
 def run_shift(request: ShiftRequest, show: Callable[[Board], None],
@@ -90,7 +93,8 @@ def run_shift(request: ShiftRequest, show: Callable[[Board], None],
         began = clock.now()
         shift = Shift(desk, cell, Measuring(desk, cell, books), _Archive(database))
         shift.run(request.bodies)
-        return ShiftDone(document, began, clock.now(), shift.done, books.settle())
+        return ShiftDone(document, began, clock.now(), shift.done, books.settle(),
+                         desk.interrupted)
 
 
 def read_shift(file: Path) -> tuple[ShiftDocument, dict[str, Prepared]]:

@@ -40,7 +40,7 @@ def stand(desk: Desk, cell: Cell, fault: Fault, detail: str, visit: Row | None =
                 desk.update(state=before, fault="", detail="", instruction="")
                 return resumes
     except KeyboardInterrupt:
-        desk.stopping = True
+        desk.interrupt()
     return False
 
 

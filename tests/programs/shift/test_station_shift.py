@@ -36,27 +36,34 @@ def test_a_shift_measures_stands_recovers_and_reports(tmp_path, monkeypatch):
     with opened(logs) as database:
         approve_job(database, place.job, by="A. Meier", cell="demo")
     cause = Cause(address, {("BODY000001", 2): "protective_stop"})
-    boards = []
+    standing = []
 
     def show(board):
-        boards.append(board)
         cause.show(board)
+        if board.fault:
+            standing.append(cause.truth())
     done = run_shift(ShiftRequest(shift, logs, simulate=True, bodies=1, speed=20.0), show, print)
     assert done.bodies == 1 and done.all_booked and cause.struck == ["protective_stop"]
-    came = _rows(logs, visits)
-    assert [(v["body_id"], v["kind"], v["state"], v["trial"]) for v in came] == [
-        ("MASTER", "master", "released", False), ("BODY000001", "body", "released", False)]
-    (fault,) = _rows(logs, faults)
-    assert fault["state"] == "protective_stop" and fault["recovered_at"] > fault["at"]
-    assert came[1]["measured"] == 3, "the body went on at the hole where it stopped"
+    _check_ledger(logs)
     booked = _bodies(logs)
     assert [b["body_id"] for b in booked] == ["BODY000001", "MASTER"]
     assert all(len(b["seal"]) == 64 and not b["trial"] for b in booked)
     with opened(logs) as database:
         assert rebuild(database, logs, lambda done, of: None) == []
     assert [{**b, "key": 0} for b in _bodies(logs)] == [{**b, "key": 0} for b in booked]
+    assert standing and not any(truth["outputs"] & 0b11 for truth in standing), "lights off"
+    assert all(max(map(abs, truth["joint_speeds"])) < 1e-3 for truth in standing), "the arm rests"
     _check_report(logs, shift)
     assert not [t for t in threading.enumerate() if t.name in ("line", "virtual-plc", "results")]
+
+
+def _check_ledger(logs):
+    came = _rows(logs, visits)
+    assert [(v["body_id"], v["kind"], v["state"], v["trial"]) for v in came] == [
+        ("MASTER", "master", "released", False), ("BODY000001", "body", "released", False)]
+    (fault,) = _rows(logs, faults)
+    assert fault["state"] == "protective_stop" and fault["recovered_at"] > fault["at"]
+    assert came[1]["measured"] == 3, "the body went on at the hole where it stopped"
 
 
 def _check_report(logs, shift):
