@@ -1,15 +1,22 @@
 """Hand-eye sessions with a known truth, for tests: a robot, a camera, a board, and noise."""
 
-from dataclasses import dataclass, field, replace
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
+import pytest
+from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from cell.core.geometry import Transform
 from cell.core.optics import CameraModel
-from cell.metrology.board_pose import BoardView, locate_boards
+from cell.metrology.board_pose import BoardPose, BoardView, locate_boards, pose_information
 from cell.metrology.hand_eye import VOLUME, HandEyeProblem, HandEyeView, RobotNoise
-from cell.metrology.motions import nudge
+from cell.metrology.hand_eye_session import HandEyeSession
+from cell.metrology.hand_eye_start import solve_park
+from cell.metrology.motions import nudge, stack
+from cell.metrology.pose_planning import plan_views
 
 WIDE = CameraModel((2448, 2048), np.array([[3478.0, 0.0, 1231.0], [0.0, 3479.0, 1017.0],
                                            [0.0, 0.0, 1.0]]),
@@ -20,6 +27,15 @@ SMALL = CameraModel((768, 576), np.array([[1620.0, 0.0, 391.0], [0.0, 1621.0, 27
 MOUNTED = Transform.from_parts([0.3, -0.2, 1.9], [31.0, -74.0, 118.0])
 BOARD = Transform.from_parts([0.15, 3.05, 0.2], [640.0, -210.0, 95.0])
 WORKING_DISTANCE = 250.0
+
+
+def recorded_sessions():
+    """Find the recorded sessions of real robots, or skip with the reason."""
+    beside = Path(__file__).parents[2] / "shared" / "data"
+    folder = Path(os.environ.get("CELL_TEST_DATA", beside)) / "hand-eye"
+    if not folder.is_dir():
+        pytest.skip(f"no recorded sessions at {folder}: set CELL_TEST_DATA")
+    return folder
 
 
 def board(columns=11, rows=8, square=10.0):
@@ -103,6 +119,43 @@ class Session:
         views = tuple(HandEyeView(*pair) for pair in zip(self.flanges, boards, strict=True))
         return HandEyeProblem(views, self.world.mount, RobotNoise())
 
-    def with_(self, **changes):
-        """Return the session with some fields exchanged."""
-        return replace(self, **changes)
+    def as_recorded(self, camera=None):
+        """Hand it over as a calibrator gets it."""
+        return HandEyeSession.seen(stack(self.flanges), tuple(self.views),
+                                   camera or self.world.camera, self.world.mount)
+
+
+def plan(world, rng, count):
+    """Choose poses greedily, from a belief that is centimetres and degrees off."""
+    candidates = world.board_poses(200, rng)
+    camera = nudge(world.carrier_from_camera, rng.normal(0.0, [0.1] * 3 + [10.0] * 3))
+    board_pose = nudge(world.reference_from_board, rng.normal(0.0, [0.1] * 3 + [20.0] * 3))
+    views = tuple(HandEyeView(board_pose @ pose.inverse @ camera.inverse, _believed(world, pose))
+                  for pose in candidates)
+    chosen = plan_views(HandEyeProblem(views), camera, board_pose, WORKING_DISTANCE, count)
+    return [candidates[index] for index in chosen]
+
+
+def _believed(world, pose):
+    pixels = world.camera.project(pose @ world.corners)
+    inside = ((pixels > 4) & (pixels < np.array(world.camera.image_size) - 5)).all(axis=1)
+    points = world.corners[inside]
+    information = pose_information(points, pose, world.camera, 0.1)
+    return BoardPose(pose, np.linalg.inv(information), points, np.zeros((len(points), 2)))
+
+
+def plain_reprojection(session):
+    """Solve as is usual: least squares of the pixels, the robot taken as exact."""
+    problem = session.problem()
+    camera = solve_park(problem.reference_from_carrier, problem.camera_from_board)
+    board_pose = (Transform(problem.reference_from_carrier[0]) @ camera
+                  @ problem.views[0].board.camera_from_board)
+    poses = [Transform(pose).inverse for pose in problem.reference_from_carrier]
+
+    def miss(step):
+        back, target = nudge(camera, step[:6]).inverse, nudge(board_pose, step[6:])
+        seen = [session.world.camera.project(back @ pose @ target @ view.points_in_board)
+                - view.pixels for pose, view in zip(poses, session.views, strict=True)]
+        return np.concatenate(seen).ravel()
+
+    return nudge(camera, least_squares(miss, np.zeros(12), x_scale="jac").x[:6])

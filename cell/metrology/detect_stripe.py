@@ -71,6 +71,12 @@ def follow_stripe(image: Image, ridge: Ridge, rim: Rim, sensor: SensorModel,
                   quality={"height": ridge.height, "gap_px": gap, "share": ridge.share})
 
 
+def centre_stripe(image: Image, ridge: Ridge, v: Array) -> tuple[Array, Array]:
+    """Locate a stripe on lines v (n,) of the image: pixels (n, 2), and its height (n,) in grey."""
+    u, height = _centres(_cut(image, ridge, v))
+    return ridge.pixels(u, v), height
+
+
 def _gap(along: Array, miss: Array, side: Array) -> tuple[float, float]:
     """Compare the two sides where they would meet: the distance, and its standard deviation."""
     middle = (along[side < 0].max() + along[side > 0].min()) / 2.0

@@ -15,12 +15,13 @@ import numpy as np
 from cell.core.geometry import Transform
 from cell.metrology.calibration_gates import Ruling
 from cell.metrology.diversity import measure_diversity
-from cell.metrology.hand_eye import FEWEST_VIEWS
+from cell.metrology.hand_eye import FEWEST_VIEWS, MOST_DROPPED
 from cell.metrology.hand_eye_session import HandEyeSession
 from cell.metrology.motions import inverse, rotation_vectors, stack
 from cell.metrology.readings import Fit, Reading, angle_gap, fit_reading, other_readings
 
 CLEARLY = 0.25          # another reading must leave so much less of the miss
+CREDIBLE = 0.01         # of the distance: a reading that leaves more explains nothing
 SUSPICIOUS = 0.5        # mm: a smaller miss needs no other reading
 UNRELATED = np.radians(2.0)  # turns of robot and camera that differ so much are not one motion
 UNIT_TOLERANCE = 0.1
@@ -67,17 +68,42 @@ def as_given(session: HandEyeSession) -> Reading:
     return Reading("as_given", "as given", session.base_from_flange, boards, session.mount)
 
 
-def moved_views(session: HandEyeSession) -> dict[int, str]:
-    """Find the views in which the robot was not standing: index and how far it moved."""
+def moved_views(session: HandEyeSession) -> dict[int, Finding]:
+    """Find the views in which the robot was not standing, by index."""
     if session.after is None:
         return {}
     between = inverse(session.base_from_flange) @ session.after
     shifts = np.linalg.norm(between[:, :3, 3], axis=1)
     turns = np.degrees(np.linalg.norm(rotation_vectors(between), axis=1))
-    return {index: f"the robot moved by {shift:.3f} mm and {turn:.4f} degrees during view "
-                   f"{session.numbers[index]}: it was left out"
+    return {index: Finding("robot_moved", "warn", f"the robot moved by {shift:.3f} mm and "
+                           f"{turn:.4f} degrees during view {session.numbers[index]}: it was left "
+                           "out")
             for index, (shift, turn) in enumerate(zip(shifts, turns, strict=True))
             if shift > STILL_MM or turn > STILL_DEG}
+
+
+def contradicting_views(session: HandEyeSession) -> dict[int, Finding]:
+    """Find views that contradict all others so grossly that they spoil the closed form, by index.
+
+    At most one in five, and only where leaving them out makes the others agree; a misreading that
+    explains everything comes first.
+    """
+    if len(session) < FEWEST_VIEWS:
+        return {}
+    given = as_given(session)
+    fit = fit_reading(given)
+    if fit.miss < CREDIBLE * given.distance or _misread(given, fit):
+        return {}
+    gone, left = list[int](), fit
+    while len(gone) < MOST_DROPPED * len(session) - 1 and left.miss > CLEARLY * fit.miss:
+        tried = {index: fit_reading(given.without([*gone, index]))
+                 for index in range(len(session)) if index not in gone}
+        worst = min(tried, key=lambda index: tried[index].miss)
+        gone, left = [*gone, worst], tried[worst]
+    if not _explains(left, fit, given.distance):
+        return {}
+    return {index: Finding("bad_view", "warn", f"view {session.numbers[index]} contradicts all "
+                           "others: it was left out, retake it") for index in gone}
 
 
 def ruled_worst(findings: list[Finding]) -> Ruling:
@@ -89,9 +115,14 @@ def ruled_worst(findings: list[Finding]) -> Ruling:
 def _misread(given: Reading, fit: Fit) -> Finding | None:
     tried = [(reading, fit_reading(reading)) for reading in other_readings(given)]
     reading, other = min(tried, key=lambda one: one[1].miss)
-    if fit.miss < SUSPICIOUS or other.miss > CLEARLY * fit.miss:
+    if fit.miss < SUSPICIOUS or not _explains(other, fit, given.distance):
         return None
     return Finding(reading.code, "refuse", f"{reading.says}. {_evidence(fit, other)}")
+
+
+def _explains(other: Fit, fit: Fit, distance: float) -> bool:
+    """Whether another reading leaves far less to explain, and little for the distance."""
+    return other.miss < CLEARLY * fit.miss and other.miss < CREDIBLE * distance
 
 
 def _evidence(fit: Fit, other: Fit) -> str:

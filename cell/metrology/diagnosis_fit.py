@@ -16,10 +16,11 @@ from cell.metrology.hand_eye_check import object_rms
 from cell.metrology.hand_eye_session import HandEyeSession
 from cell.metrology.hand_eye_start import solve_park
 
-BETTER = 10.0          # F ratio of the corners' misfit, beyond chance however the views lie
+BETTER = 4.0           # F ratio of the corners' misfit: beyond chance
 CERTAIN = 4.0          # standard uncertainties
 NOTABLE = 0.002        # of the focal length: 0.1 degrees, or 0.5 mm at 250 mm
-HARMFUL = 1.5          # by how much another camera makes the board stand stiller
+HARMFUL = 1.4          # by how much another camera fits better, corners or board
+JUMP = 8.0             # F ratio of a moved board: beyond chance and slow drifts
 HALVED = 0.5           # what a moved board must make of the misfit
 NOT_NOISE = 2.0        # chi2 from which a moved board is looked for
 LEAST_BUMP = 0.1       # mm
@@ -33,6 +34,7 @@ class CameraCheck:
     better: float
     change: float
     change_sigmas: float
+    pnp_rms_given: float
     object_rms_given: float
     object_rms_own: float
 
@@ -40,7 +42,8 @@ class CameraCheck:
     def doubtful(self) -> bool:
         """Whether the given parameters do not fit these pictures, and it matters."""
         shifted = self.change > NOTABLE and self.change_sigmas > CERTAIN
-        harmful = self.object_rms_given > HARMFUL * self.object_rms_own
+        harmful = (self.object_rms_given > HARMFUL * self.object_rms_own
+                   or self.pnp_rms_given > HARMFUL * self.own.rms_px)
         return self.better > BETTER and (shifted or harmful)
 
 
@@ -58,7 +61,7 @@ def check_camera(session: HandEyeSession) -> CameraCheck | None:
     return CameraCheck(own, _better(session, own),
                        float(np.abs(step).max() / session.camera.matrix[0, 0]),
                        float(np.abs(step / sigmas).max()),
-                       _still(session), _still(again))
+                       session.pnp_rms_px, _still(session), _still(again))
 
 
 def judge_camera(check: CameraCheck | None, split_half: Gate) -> list[Finding]:
@@ -66,7 +69,7 @@ def judge_camera(check: CameraCheck | None, split_half: Gate) -> list[Finding]:
     found: list[Finding] = []
     if check is None:
         return found
-    if split_half.rule(100.0 * check.own.split_half) == "refuse":
+    if 100.0 * check.own.split_half > (split_half.refuse_above or np.inf):
         found.append(Finding("intrinsics", "refuse", "the intrinsics are doubtful: the focal "
                      f"length differs by {100 * check.own.split_half:.2f} % between even and odd "
                      "views. Calibrate the camera again, with tilted views over the whole image."))
@@ -74,7 +77,8 @@ def judge_camera(check: CameraCheck | None, split_half: Gate) -> list[Finding]:
         found.append(Finding("intrinsics", "refuse", "the intrinsics do not fit these pictures: "
                      "parameters from the same corners change the camera by "
                      f"{100 * check.change:.2f} % of the focal length ({check.change_sigmas:.0f} "
-                     f"standard uncertainties), and the board stands still to "
+                     f"standard uncertainties); corners then miss by {check.own.rms_px:.2f} px "
+                     f"instead of {check.pnp_rms_given:.2f}, and the board stands still to "
                      f"{check.object_rms_own:.3g} mm instead of {check.object_rms_given:.3g} mm."))
     return found
 
@@ -84,13 +88,15 @@ def judge_board(session: HandEyeSession, problem: HandEyeProblem,
     """Say whether the board seems to have moved during the session."""
     bump = find_bump(problem, result)
     if (bump is None or result.chi2 < NOT_NOISE or bump.shift < LEAST_BUMP
-            or bump.explanation.chi2 > HALVED * result.chi2):
+            or bump.explanation.better < JUMP):
         return []
-    return [Finding("board_moved", "refuse", f"the residuals jump between view "
+    certain = bump.explanation.chi2 < HALVED * result.chi2
+    return [Finding("board_moved", "refuse" if certain else "warn",
+                    "the residuals jump between view "
                     f"{session.numbers[bump.after_view]} and view "
                     f"{session.numbers[bump.before_view]}: the board seems to have moved by "
                     f"{bump.shift:.2f} mm (misfit {result.chi2:.1f}, with that "
-                    f"{bump.explanation.chi2:.1f}). Fix it and begin again.")]
+                    f"{bump.explanation.chi2:.1f}). If so, fix it and begin again.")]
 
 
 def judge_views(session: HandEyeSession, problem: HandEyeProblem,
@@ -101,15 +107,17 @@ def judge_views(session: HandEyeSession, problem: HandEyeProblem,
             for index in result.dropped]
 
 
-def judge_scale(scale: Explanation, gate: Gate) -> list[Finding]:
+def judge_scale(scale: Explanation, chi2: float, gate: Gate) -> list[Finding]:
     """Say what the robot's motions make of the board's size, where they contradict the entry."""
     percent, sigma = 100.0 * float(scale.values[0]), 100.0 * float(scale.sigmas[0])
     ruling = gate.rule(abs(percent))
-    if ruling == "pass" or abs(percent) < CERTAIN * sigma:
+    explains = chi2 > NOT_NOISE and scale.chi2 < HALVED * chi2
+    if abs(percent) < CERTAIN * sigma or (ruling == "pass" and not explains):
         return []
     differs = f"{abs(percent):.1f} % {'larger' if percent > 0 else 'smaller'}"
-    return [Finding("board_scale", ruling, f"the board is {differs} than entered (+- {sigma:.2f} "
-                    "%), or the robot or the focal length is off by as much: measure the squares")]
+    return [Finding("board_scale", "refuse" if ruling == "refuse" else "warn",
+                    f"the board is {differs} than entered (+- {sigma:.2f} %), or the robot or the "
+                    "focal length is off by as much: measure the squares")]
 
 
 def _better(session: HandEyeSession, own: CameraResult) -> float:

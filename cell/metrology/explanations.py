@@ -18,11 +18,15 @@ FEWEST_EACH_SIDE = 3  # views before and after a bump
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """An extra unknown: its values, their standard uncertainties, and the fit's chi2 with it."""
+    """An extra unknown: its values, their standard uncertainties, and the fit's chi2 with it.
+
+    `better` is the F ratio of what it explains.
+    """
 
     values: Array
     sigmas: Array
     chi2: float
+    better: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +68,8 @@ def explain(result: HandEyeResult, columns: Array) -> Explanation:
     left = misfit + rows @ step
     chi2 = float(left @ left) / max(1, left.size - rows.shape[1])
     covariance = np.linalg.pinv(rows.T @ rows, hermitian=True) * max(1.0, chi2)
-    return Explanation(step[UNKNOWNS:], np.sqrt(np.diag(covariance))[UNKNOWNS:], chi2)
+    better = float(misfit @ misfit - left @ left) / columns.shape[2] / max(chi2, 1e-12)
+    return Explanation(step[UNKNOWNS:], np.sqrt(np.diag(covariance))[UNKNOWNS:], chi2, better)
 
 
 def _moved_from(result: HandEyeResult, view: int) -> Array:

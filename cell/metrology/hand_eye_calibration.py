@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias
 
 from cell.metrology.calibration_gates import Checked, GateSet, check_gates, worst
-from cell.metrology.diagnosis import Finding, diagnose, moved_views, ruled_worst
+from cell.metrology.diagnosis import (
+    Finding,
+    contradicting_views,
+    diagnose,
+    moved_views,
+    ruled_worst,
+)
 from cell.metrology.diagnosis_fit import (
     check_camera,
     judge_board,
@@ -17,7 +23,7 @@ from cell.metrology.diagnosis_fit import (
 )
 from cell.metrology.explanations import estimate_board_scale
 from cell.metrology.hand_eye import HandEyeProblem, Mount, solve_hand_eye
-from cell.metrology.hand_eye_check import HeldOut, solve_and_hold_out
+from cell.metrology.hand_eye_check import HeldOut, solve_and_hold_out, solve_apart
 from cell.metrology.hand_eye_figures import fit_figures, input_figures, what_limits
 from cell.metrology.hand_eye_session import HandEyeSession
 
@@ -48,10 +54,10 @@ class HandEyeAnswer:
 
     @property
     def reasons(self) -> tuple[str, ...]:
-        """What was found: what refuses before what warns, causes before figures."""
-        said = [*((finding.verdict, finding.sentence) for finding in self.findings),
-                *((gate.verdict, str(gate)) for gate in self.gates)]
-        return tuple(sentence for wanted in ("refuse", "warn")
+        """What was found: causes before figures, what refuses before what warns."""
+        causes = [(finding.verdict, finding.sentence) for finding in self.findings]
+        figures = [(gate.verdict, str(gate)) for gate in self.gates]
+        return tuple(sentence for said in (causes, figures) for wanted in ("refuse", "warn")
                      for verdict, sentence in said if verdict == wanted)
 
     @property
@@ -76,22 +82,25 @@ class HandEyeAnswer:
         return () if self.held_out is None else tuple(self.numbers[i] for i in self.held_out.apart)
 
 
-def calibrate_hand_eye(session: HandEyeSession, gates: GateSet) -> HandEyeAnswer:
+def calibrate_hand_eye(session: HandEyeSession, gates: GateSet,
+                       apart: Collection[int] = ()) -> HandEyeAnswer:
     """Diagnose a session, solve it where that has a meaning, and judge the solution by the gates.
 
-    Board poses without corners are solved and not judged: nothing says what they are worth.
+    Board poses without corners are solved and not judged: nothing says what they are worth. The
+    views numbered `apart` are never fitted; without any, some are chosen.
     """
     moved = moved_views(session)
-    standing = session.without(moved)
-    findings = [*diagnose(standing),
-                *(Finding("robot_moved", "warn", sentence) for sentence in moved.values())]
-    left_out = _numbers(session, moved)
+    steady = session.without(moved)
+    gross = contradicting_views(steady)
+    standing = steady.without(gross)
+    left_out = _numbers(session, moved) + _numbers(steady, gross)
+    findings = [*diagnose(standing), *moved.values(), *gross.values()]
     if ruled_worst(findings) == "refuse":
         return HandEyeAnswer("refuse", session.mount, tuple(findings), left_out=left_out)
     problem = standing.problem(gates.robot.noise)
     whole = solve_hand_eye(problem)
     kept = standing.without(whole.dropped)
-    answer = _judged(kept, gates) if session.views else _solved(kept, gates)
+    answer = _judged(kept, gates, apart) if session.views else _solved(kept, gates)
     about = [*(judge_board(standing, problem, whole) if session.views else []),
              *judge_views(standing, problem, whole), *findings]
     return _with(answer, about, left_out + _numbers(standing, whole.dropped))
@@ -104,15 +113,17 @@ def _solved(session: HandEyeSession, gates: GateSet) -> HandEyeAnswer:
                          fit_figures(session, problem, held_out), problem, session.numbers)
 
 
-def _judged(session: HandEyeSession, gates: GateSet) -> HandEyeAnswer:
+def _judged(session: HandEyeSession, gates: GateSet, apart: Collection[int]) -> HandEyeAnswer:
     problem = session.problem(gates.robot.noise)
-    held_out = solve_and_hold_out(problem)
-    scale = estimate_board_scale(problem, solve_hand_eye(problem))
+    kept_apart = [index for index, number in enumerate(session.numbers) if number in apart]
+    held_out = solve_apart(problem, kept_apart) if kept_apart else solve_and_hold_out(problem)
+    whole = solve_hand_eye(problem)
+    scale = estimate_board_scale(problem, whole)
     camera = check_camera(session)
     figures = {**input_figures(session, camera, scale), **fit_figures(session, problem, held_out)}
     limits = gates.hand_eye
     found = [*judge_camera(camera, limits["split_half_percent"]), *_preview(session),
-             *judge_scale(scale, limits["board_scale_percent"])]
+             *judge_scale(scale, whole.chi2, limits["board_scale_percent"])]
     return HandEyeAnswer("pass", session.mount, tuple(found), check_gates(figures, limits),
                          held_out, figures, problem, session.numbers,
                          limited_by=what_limits(figures, camera, limits))

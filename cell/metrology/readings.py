@@ -7,7 +7,7 @@ bad view does not hide it either. Readings are evidence: nothing is corrected by
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -39,6 +39,16 @@ class Reading:
     base_from_flange: Array
     camera_from_board: Array
     mount: Mount
+
+    @property
+    def distance(self) -> float:
+        """How far (mm) the board was from the camera, on average."""
+        return float(self.camera_from_board[:, 2, 3].mean())
+
+    def without(self, indices: Sequence[int]) -> Reading:
+        """Leave out some views."""
+        return replace(self, base_from_flange=np.delete(self.base_from_flange, indices, axis=0),
+                       camera_from_board=np.delete(self.camera_from_board, indices, axis=0))
 
     @property
     def reference_from_carrier(self) -> Array:

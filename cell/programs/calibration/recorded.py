@@ -1,10 +1,12 @@
 """A recorded hand-eye session in a folder: robot poses, corners or board poses, the camera.
 
-    base_from_flange.csv     view, m00..m33: the controller's flange pose, mm
-    views.npz                object_mm (view, corner, 3), image_px (view, corner, 2), padded by NaN
-    camera.yaml              image_size, camera_matrix, distortion [k1, k2, p1, p2, k3]
-    camera_from_board.csv    instead of the two: board poses alone
-    expected.yaml            may hold camera_mount: flange or static
+| file | content |
+|---|---|
+| base_from_flange.csv | view, m00..m33: the controller's flange pose, mm |
+| views.npz | object_mm (view, corner, 3), image_px (view, corner, 2), padded by NaN |
+| camera.yaml | image_size, camera_matrix, distortion [k1, k2, p1, p2, k3] |
+| camera_from_board.csv | instead of the two: board poses alone |
+| expected.yaml | may hold camera_mount: flange or static |
 """
 
 from __future__ import annotations
@@ -18,8 +20,9 @@ import numpy as np
 
 from cell.archive.files import read_text
 from cell.core.documents.base import Document, Matrix3, Number
+from cell.core.documents.strict_yaml import read_tree
 from cell.core.documents.table import Row, read_table
-from cell.core.documents.text import parse, read_tree
+from cell.core.documents.text import parse
 from cell.core.errors import DocumentError, UnmeasurableError
 from cell.core.geometry import Array
 from cell.core.optics import CameraModel
@@ -133,19 +136,19 @@ def _pose(row: Row) -> Array:
 
 def _read_corners(file: Path) -> list[BoardView]:
     try:
-        with np.load(file, allow_pickle=False) as archive:
+        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
             points, pixels = (np.asarray(archive[name], dtype=np.float64)
                               for name in ("object_mm", "image_px"))
     except FileNotFoundError:
         raise DocumentError("there is no such file", source=str(file)) from None
     except KeyError:
-        raise DocumentError("expected the arrays object_mm and image_px", source=str(file)) from None
+        raise DocumentError("expected arrays object_mm and image_px", source=str(file)) from None
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise DocumentError(f"not a readable .npz of numbers: {error}", source=str(file)) from None
     if points.ndim != 3 or points.shape[2] != 3 or pixels.shape != (*points.shape[:2], 2):
         raise DocumentError("expected object_mm (view, corner, 3) and image_px (view, corner, 2); "
                             f"came {points.shape} and {pixels.shape}", source=str(file))
-    seen = np.isfinite(points).all(axis=2) & np.isfinite(pixels).all(axis=2)
+    seen = np.asarray(np.isfinite(points).all(axis=2) & np.isfinite(pixels).all(axis=2))
     if np.abs(points[seen][:, 2]).max(initial=0.0) > FLAT:
         raise DocumentError("object_mm: expected a flat board with z = 0", source=str(file))
     return [BoardView(point[ok], pixel[ok])
@@ -172,9 +175,9 @@ def _choose_mount(folder: Path, session: HandEyeSession) -> tuple[HandEyeSession
     fits = {mount: fit_reading(as_given(session.mounted(mount))) for mount in mounts}
     best, other = sorted(mounts, key=lambda mount: fits[mount].miss)
     return session.mounted(best), (
-        f"nothing in {folder.name} says how the camera is mounted: taken as {best}, where the board "
-        f"stands still to {fits[best].miss:.3g} mm (as {other}: {fits[other].miss:.3g} mm). Poses "
-        "given the other way round would look the same: say --mount if it is known")
+        f"nothing in {folder.name} says how the camera is mounted: taken as {best}, where the "
+        f"board stands still to {fits[best].miss:.3g} mm (as {other}: {fits[other].miss:.3g} mm). "
+        "Poses given the other way round would look the same: say --mount if it is known")
 
 
 def _same_length(folder: Path, robot: Array, others: Array | list[BoardView]) -> None:

@@ -1,0 +1,91 @@
+"""Taking one view: drive, stand still, one picture under the ring light and one of the stripe."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from cell.core.documents.base import Matrix4, Vector6
+from cell.core.documents.calibration_session import Purpose, ViewRecord
+from cell.core.geometry import Transform
+from cell.core.observation import Light, View
+from cell.core.ports import Joints, Move
+from cell.programs.calibration.session import Session
+from cell.programs.inspection.look import take_view
+from cell.programs.station import Station
+
+SLOW = 0.5  # of the cell's speed: nobody is in a hurry
+
+
+@dataclass(frozen=True, eq=False)
+class Shots:
+    """Two pictures from one place."""
+
+    ring: View
+    stripe: View
+
+    def moved(self, station: Station) -> bool:
+        """Whether the flange stood elsewhere for the second picture."""
+        shift, turn = self.ring.base_from_flange_before.distance(
+            self.stripe.base_from_flange_after)
+        return shift > station.document.still_mm or turn > station.document.still_rad
+
+
+def drive(station: Station, path: Sequence[Joints]) -> None:
+    """Drive through joints at half of the cell's speed.
+
+    Raises:
+        DeviceError: the robot failed or was stopped.
+    """
+    robot = station.document.robot
+    station.robot.move_to([Move(joints, SLOW * robot.speed_rad_per_s,
+                                robot.acceleration_rad_per_s2) for joints in path])
+
+
+def shoot(station: Station) -> Shots:
+    """Take both pictures; the laser burns for one of them and no longer.
+
+    Raises:
+        DeviceError: robot, lights or camera failed; the lights are off.
+    """
+    camera = station.document.camera
+    try:
+        ring = _look(station, "ring", camera.exposure_ring_s)
+        return Shots(ring, _look(station, "laser", camera.exposure_laser_s))
+    finally:
+        station.lights.off()
+
+
+def record(session: Session, number: int, purpose: Purpose, shots: Shots,
+           corners: int, status: str) -> ViewRecord:
+    """Write a view to the disk: pictures first, then its line.
+
+    Raises:
+        DocumentError: the disk refuses.
+    """
+    ring = session.write_image(f"{number:04d}_board.png", shots.ring.image)
+    stripe = session.write_image(f"{number:04d}_stripe.png", shots.stripe.image)
+    view = ViewRecord(
+        number=number, purpose=purpose, joints=as_six(shots.ring.joints),
+        base_from_flange=as_rows(shots.ring.base_from_flange_before),
+        base_from_flange_after=as_rows(shots.stripe.base_from_flange_after),
+        time=shots.ring.time, ring=ring, stripe=stripe, corners=corners, status=status)
+    session.append(view)
+    return view
+
+
+def as_rows(transform: Transform) -> Matrix4:
+    """Write a transform as a document has it."""
+    a, b, c, d = (tuple(float(value) for value in row) for row in transform.matrix)
+    return a, b, c, d  # type: ignore[return-value]  # four rows of four
+
+
+def as_six(values: Sequence[float]) -> Vector6:
+    """Write six numbers as a document has them."""
+    a, b, c, d, e, f = (float(value) for value in values)
+    return a, b, c, d, e, f
+
+
+def _look(station: Station, light: Light, exposure: float) -> View:
+    station.lights.set(light)
+    return take_view(station, light, exposure, 0)

@@ -1,0 +1,118 @@
+"""A calibration session on disk: one synced line a view, so that a crash costs one view at most."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+
+from cell.archive.files import read_text, replace_text, sync
+from cell.archive.images import read_image
+from cell.core.documents.calibration_session import SessionHeader, ViewRecord
+from cell.core.errors import DocumentError
+from cell.core.observation import Image
+
+HEADER, VIEWS, IMAGES = "session.json", "views.jsonl", "images"
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """A session's folder."""
+
+    folder: Path
+    header: SessionHeader
+
+    @classmethod
+    def begin(cls, folder: Path, header: SessionHeader) -> Session:
+        """Make the folder of a new session.
+
+        Raises:
+            DocumentError: the disk refuses.
+        """
+        try:
+            (folder / IMAGES).mkdir(parents=True)
+        except OSError as error:
+            raise DocumentError(f"cannot be made: {error.strerror}", source=str(folder)) from None
+        replace_text(folder / HEADER, header.model_dump_json(indent=1))
+        return cls(folder, header)
+
+    @classmethod
+    def read(cls, folder: Path) -> Session:
+        """Open a session that was begun before.
+
+        Raises:
+            DocumentError: there is none, or it is of a newer version.
+        """
+        text = read_text(folder / HEADER)
+        try:
+            return cls(folder, SessionHeader.model_validate_json(text))
+        except ValueError as error:
+            raise DocumentError(f"not a calibration session: {error}",
+                                source=str(folder / HEADER)) from None
+
+    @property
+    def views(self) -> tuple[ViewRecord, ...]:
+        """The views as they were written; a last line that was cut short does not count."""
+        file = self.folder / VIEWS
+        lines = read_text(file).splitlines() if file.exists() else []
+        whole = [line for line in lines if _is_whole(line)]
+        latest = {view.number: view for view in map(ViewRecord.model_validate_json, whole)}
+        return tuple(latest[number] for number in sorted(latest))
+
+    def append(self, view: ViewRecord) -> None:
+        """Add a view; on return it is on the disk.
+
+        Raises:
+            DocumentError: the disk refuses; what was written before is whole.
+        """
+        file = self.folder / VIEWS
+        known = file.read_bytes() if file.exists() else b""
+        cut = b"\n" if known and not known.endswith(b"\n") else b""
+        try:
+            with file.open("ab") as stream:
+                stream.write(cut + view.model_dump_json().encode() + b"\n")
+                stream.flush()
+                os.fsync(stream.fileno())
+        except OSError as error:
+            raise DocumentError(f"cannot be written: {error.strerror}", source=str(file)) from None
+
+    def write_image(self, name: str, image: Image) -> str:
+        """Keep a picture; on return it is on the disk. Returns its name in the folder."""
+        path = self.folder / IMAGES / name
+        _, encoded = cv2.imencode(".png", image)
+        try:
+            with path.open("wb") as stream:
+                stream.write(encoded.tobytes())
+                stream.flush()
+                os.fsync(stream.fileno())
+            sync(path.parent)
+        except OSError as error:
+            raise DocumentError(f"cannot be written: {error.strerror}", source=str(path)) from None
+        return f"{IMAGES}/{name}"
+
+    def read_image(self, name: str, image_size: tuple[int, int]) -> Image:
+        """Read a picture back."""
+        return read_image(self.folder / name, image_size)
+
+
+def latest_session(folder: Path) -> Path:
+    """Find the newest session of a cell.
+
+    Raises:
+        DocumentError: there is none.
+    """
+    sessions = sorted(path.parent for path in (folder / "sessions").glob(f"*/{HEADER}"))
+    if not sessions:
+        raise DocumentError("there is no session to go on with", source=str(folder / "sessions"))
+    return sessions[-1]
+
+
+def _is_whole(line: str) -> bool:
+    try:
+        json.loads(line)
+    except json.JSONDecodeError:
+        return False
+    return True

@@ -1,0 +1,163 @@
+"""From a session's pictures to camera, light plane and hand-eye: three results, one set."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cell.core.documents.calibration_session import ViewRecord
+from cell.core.errors import DocumentError, UnmeasurableError
+from cell.core.geometry import Array, Transform
+from cell.core.observation import Image
+from cell.core.optics import CameraModel
+from cell.metrology.board_pose import BoardView, locate_boards
+from cell.metrology.calibration_gates import Checked, GateSet, Ruling, check_gates, worst
+from cell.metrology.camera_calibration import TILTED, CameraResult, solve_camera
+from cell.metrology.detect_board import BoardDesign, detect_board
+from cell.metrology.detect_board_stripe import detect_board_stripe
+from cell.metrology.hand_eye_calibration import HandEyeAnswer, calibrate_hand_eye
+from cell.metrology.hand_eye_session import HandEyeSession
+from cell.metrology.light_plane import LightPlaneResult, StripeOnBoard, solve_light_plane
+from cell.metrology.motions import stack
+from cell.programs.calibration.belief import Belief, design_of
+from cell.programs.calibration.recorded import read_gates
+from cell.programs.calibration.session import Session
+
+DEPTH = 44.0  # mm over which a light plane should have been seen: the depth of field
+
+
+@dataclass(frozen=True, eq=False)
+class SeenView:
+    """One view of a session as detection sees it; no stripe where none was found."""
+
+    record: ViewRecord
+    board: BoardView
+    stripe: Array | None
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """All that a session gave; None for what was not asked for and stays as in the active set.
+
+    `gates` are by step. `camera` is the one that light plane and hand-eye were solved with.
+    """
+
+    views: tuple[SeenView, ...]
+    camera: CameraModel
+    camera_result: CameraResult | None = None
+    light_plane: LightPlaneResult | None = None
+    hand_eye: HandEyeAnswer | None = None
+    gates: dict[str, tuple[Checked, ...]] = field(default_factory=dict)
+
+    @property
+    def verdict(self) -> Ruling:
+        """The worst verdict over all steps."""
+        findings = () if self.hand_eye is None else self.hand_eye.findings
+        return worst([*(gate.verdict for gates in self.gates.values() for gate in gates),
+                      *(finding.verdict for finding in findings)])
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """What speaks against it, step by step."""
+        camera_and_plane = [f"{step}: {gate}" for step in ("camera", "light plane")
+                            for gate in self.gates.get(step, ()) if gate.verdict != "pass"]
+        return (*camera_and_plane, *(() if self.hand_eye is None else self.hand_eye.reasons))
+
+
+def solve_session(session: Session, belief: Belief) -> Solution:
+    """Solve what the session was begun for, from its pictures on the disk.
+
+    Raises:
+        DocumentError: too few views to solve anything from.
+    """
+    gates = read_gates().level(session.header.plan.gates)
+    views = see_views(session, belief)
+    try:
+        return _solve(views, session, belief, gates)
+    except UnmeasurableError as error:
+        raise DocumentError(f"{error.detail}", source=str(session.folder)) from None
+
+
+def see_views(session: Session, belief: Belief) -> tuple[SeenView, ...]:
+    """Detect board and stripe in every usable view of a session."""
+    size = belief.sensor.camera.image_size
+    return tuple(see_view(view, session.read_image(view.ring, size),
+                          session.read_image(view.stripe, size), belief,
+                          design_of(session.header.board))
+                 for view in session.views
+                 if view.status == "ok" and view.purpose in ("fit", "hold_out"))
+
+
+def see_view(record: ViewRecord, ring: Image, stripe: Image, belief: Belief,
+             design: BoardDesign) -> SeenView:
+    """Detect board and stripe in the two pictures of a view.
+
+    Raises:
+        UnmeasurableError: no board.
+    """
+    board = detect_board(ring, design).view
+    try:
+        points = detect_board_stripe(stripe, ring, belief.sensor.camera, upright=belief.upright)
+    except UnmeasurableError:
+        return SeenView(record, board, None)
+    return SeenView(record, board, points)
+
+
+def _solve(views: tuple[SeenView, ...], session: Session, belief: Belief,
+           gates: GateSet) -> Solution:
+    what = session.header.what
+    fitted = [view for view in views if view.record.purpose == "fit"]
+    checks, camera_result, plane, answer = dict[str, tuple[Checked, ...]](), None, None, None
+    camera = belief.sensor.camera
+    if what in ("camera", "all"):
+        camera_result = solve_camera([view.board for view in fitted], camera.image_size, camera)
+        camera = camera_result.camera
+        checks["camera"] = check_gates(camera_figures(camera_result), gates.camera)
+    if what in ("light-plane", "all"):
+        plane = _plane(fitted, camera)
+        checks["light plane"] = check_gates(plane_figures(plane), gates.light_plane)
+    if what in ("hand-eye", "all"):
+        answer = _hand_eye(views, camera, gates)
+        checks["hand-eye"] = answer.gates
+    return Solution(views, camera, camera_result, plane, answer, checks)
+
+
+def _plane(views: Sequence[SeenView], camera: CameraModel) -> LightPlaneResult:
+    seen = [view for view in views if view.stripe is not None]
+    boards = locate_boards([view.board for view in seen], camera) if seen else []
+    stripes = [StripeOnBoard(view.stripe, board.camera_from_board)
+               for view, board in zip(seen, boards, strict=True) if view.stripe is not None]
+    return solve_light_plane(stripes, camera)
+
+
+def _hand_eye(views: Sequence[SeenView], camera: CameraModel, gates: GateSet) -> HandEyeAnswer:
+    session = HandEyeSession.seen(
+        stack(view.record.pose for view in views), tuple(view.board for view in views), camera,
+        "flange", stack(view.record.pose_after for view in views))
+    apart = [view.record.number for view in views if view.record.purpose == "hold_out"]
+    numbered = session.numbered(tuple(view.record.number for view in views))
+    return calibrate_hand_eye(numbered, gates, apart)
+
+
+def camera_figures(result: CameraResult) -> dict[str, float]:
+    """What the gates of the camera look at."""
+    return {"rms_px": result.rms_px, "views": len(result.residuals),
+            "tilted_views": int(np.sum(result.tilts > TILTED)),
+            "covered_percent": 100.0 * result.covered,
+            "split_half_percent": 100.0 * result.split_half}
+
+
+def plane_figures(result: LightPlaneResult) -> dict[str, float]:
+    """What the gates of the light plane look at."""
+    near, far = result.depths
+    return {"poses": len(result.residuals), "depth_percent": min(100.0, 100 * (far - near) / DEPTH),
+            "rms_mm": result.rms, "left_out_mm": result.left_out_rms,
+            "normal_sigma_deg": float(np.degrees(result.normal_sigma))}
+
+
+def board_in_base(view: SeenView, belief: Belief) -> Transform:
+    """Say where the board stands by this view and what is believed of sensor and mount."""
+    board = locate_boards([view.board], belief.sensor.camera)[0]
+    return view.record.pose @ belief.flange_from_camera @ board.camera_from_board
