@@ -19,9 +19,9 @@ RADII = [3.0, 5.0, 10.0, 15.0]
 
 def error_model(
     sensor: Path = typer.Option(..., metavar="FILE", help="The sensor: camera and light plane."),
-    x: float = typer.Option(5.0, metavar="MM", help="Range of x_d, either way."),
-    y: float = typer.Option(5.0, metavar="MM", help="Range of y_d, either way."),
-    z: float = typer.Option(5.0, metavar="MM", help="Range of z_d, either way."),
+    x: float = typer.Option(5.0, "--x-mm", metavar="MM", help="Range of x_d, either way."),
+    y: float = typer.Option(5.0, "--y-mm", metavar="MM", help="Range of y_d, either way."),
+    z: float = typer.Option(5.0, "--z-mm", metavar="MM", help="Range of z_d, either way."),
     tilt_deg: float = typer.Option(2.0, metavar="DEG", help="Range of the tilt β, either way."),
     radius: list[float] = typer.Option(RADII, metavar="MM", help="Radii for the general formula; "
                                                                  "may be repeated."),
@@ -61,7 +61,7 @@ def error_model(
 def _ranges(reach: dict[str, float], tilt_deg: float, radii: list[float]) -> Ranges:
     from cell.metrology.error_model import Ranges
 
-    wrong = [f"--{name} {value}" for name, value in reach.items() if not 0 < value < 100]
+    wrong = [f"--{name}-mm {value}" for name, value in reach.items() if not 0 < value < 100]
     wrong += [f"--tilt-deg {tilt_deg}"] if not 0 < tilt_deg <= 30 else []
     wrong += [f"--radius {value}" for value in radii if not 0 < value < 100]
     if wrong:
