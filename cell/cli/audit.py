@@ -85,13 +85,14 @@ def _audit_with_progress(logs: Sequence[Path], question: Question, workers: int,
                          cluster_address: str | None) -> Iterator[LogAudit]:
     from rich.progress import Progress
 
-    from cell.programs.audit.spread import audit_each, cluster, processes
+    from cell.programs.audit.spread import audit_each, cluster
+    from cell.recording.guard import processes
 
     with ExitStack() as stack:
         executor: Executor | None = None
         if cluster_address is not None:
             executor = stack.enter_context(cluster(cluster_address))
-        elif workers > 1:
+        elif workers > 1 or question.unsealed:  # what no seal vouches for may take a process down
             executor = stack.enter_context(processes(workers))
         bar = stack.enter_context(Progress(console=console, transient=True))
         task = bar.add_task("auditing", total=len(logs))

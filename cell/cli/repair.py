@@ -21,9 +21,10 @@ def repair(
 
     Exit code: 0 repaired, 2 nothing to repair, altered or unreadable, 4 the copy cannot be written.
     """
+    from cell.recording.guard import guarded
     from cell.recording.repair import repair as repair_log
 
-    seal = repair_log(log)
+    seal = guarded(repair_log, log)
     copy = log.with_name(seal.file)
     if as_json:
         print_json({"ok": True, "log": str(copy), "holes": seal.holes, "chain": seal.chain})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import typer
@@ -27,9 +28,10 @@ def view(
 
     Exit code: 0 closed, 2 unreadable or no such hole, 3 no viewer or no screen.
     """
+    from cell.recording.guard import guarded
     from cell.recording.replay import find_hole, photograph, serve, show
 
-    number = find_hole(log, hole)
+    number = guarded(partial(find_hole, hole_id=hole), log)
     if picture is not None:
         picture.write_bytes(photograph(log, number).png)
     elif web:

@@ -14,7 +14,8 @@ from cell.programs.audit.folder import audit_folder
 from cell.programs.audit.gather import gather_logs, parse_since, read_what_if, started_since
 from cell.programs.audit.log import audit_log
 from cell.programs.audit.question import Question
-from cell.programs.audit.spread import audit_each, cluster, processes
+from cell.programs.audit.spread import audit_each, cluster
+from cell.recording.guard import processes
 from cell.recording.seal import seal_path
 
 

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, Future, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from cell.core.errors import DeviceError, DocumentError
 from cell.programs.audit.log import Watch, audit_log, unwatched
 from cell.programs.audit.question import Question
 from cell.programs.audit.report import LogAudit
+from cell.recording.guard import guarded
 
 
 def audit_each(logs: Sequence[Path], question: Question, executor: Executor | None = None,
@@ -40,18 +41,10 @@ def _result(future: Future[LogAudit], log: Path, question: Question) -> LogAudit
 
 def _alone(log: Path, question: Question) -> LogAudit:
     """Audit one recording in a process of its own: it may be the one that takes processes down."""
-    with processes(1) as executor:
-        try:
-            return executor.submit(audit_log, log.resolve(), question).result()
-        except BrokenProcessPool:
-            return LogAudit(log, "reading it takes the process down: it is damaged")
-
-
-@contextmanager
-def processes(count: int) -> Iterator[Executor]:
-    """Give `count` processes on this machine."""
-    with ProcessPoolExecutor(count, multiprocessing.get_context("spawn")) as executor:
-        yield executor
+    try:
+        return guarded(partial(audit_log, question=question), log)
+    except DocumentError as error:
+        return LogAudit(log, str(error))
 
 
 @contextmanager

@@ -1,0 +1,93 @@
+"""What an audit costs: holes a second, where the time goes, two workers against one, memory."""
+
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import pytest
+from recorded_body import measured_anew, record_body
+
+from cell.programs.audit import log as audit_module
+from cell.programs.audit.log import audit_log
+from cell.programs.audit.question import Question
+from cell.programs.audit.spread import audit_each
+from cell.recording import pages
+from cell.recording.guard import processes
+
+pytestmark = [pytest.mark.bench, pytest.mark.timeout(900)]
+
+
+@pytest.fixture(scope="module")
+def holes():
+    """Twenty-four holes: those of the golden recording, eight times."""
+    _, seen = measured_anew()
+    return tuple(replace(seen[k % 3], index=k) for k in range(24))
+
+
+def timed(monkeypatch, module, name, spent):
+    """Count the seconds that a function takes."""
+    inner = getattr(module, name)
+
+    def outer(*arguments):
+        began = time.perf_counter()
+        try:
+            return inner(*arguments)
+        finally:
+            spent[name] = spent.get(name, 0.0) + time.perf_counter() - began
+
+    monkeypatch.setattr(module, name, outer)
+
+
+def test_holes_a_second_and_where_the_time_goes(tmp_path, holes, monkeypatch, capsys):
+    log = record_body(tmp_path / "body.rrd", holes=holes)
+    audit_log(log)
+    began = time.perf_counter()
+    plain = audit_log(log)
+    total = time.perf_counter() - began
+    spent = {}
+    for module, name in ((pages, "_decode"), (pages, "pixel_hash"), (pages, "link"),
+                         (audit_module, "measure_hole"), (audit_module, "judge_run")):
+        timed(monkeypatch, module, name, spent)
+    began = time.perf_counter()
+    audit_log(log)
+    rest = time.perf_counter() - began - sum(spent.values())
+    with capsys.disabled():
+        print(f"\naudit: {len(holes) / total:.1f} holes/s on one core ({plain.answer}); a hole "
+              "takes " + ", ".join(f"{name.strip('_')} {1e3 * seconds / len(holes):.1f} ms"
+                          for name, seconds in (spent | {"read and compare": rest}).items()))
+    assert plain.answer == "identical"
+
+
+def test_two_workers_against_one(tmp_path, holes, capsys):
+    logs = [record_body(tmp_path / f"{name}.rrd", holes=holes) for name in "abcd"]
+    seconds = {}
+    for count in (1, 2):
+        with processes(count) as executor:
+            list(audit_each(logs[:count], Question(), executor))  # started and imported
+            began = time.perf_counter()
+            answers = [audit.answer for audit in audit_each(logs, Question(), executor)]
+            seconds[count] = time.perf_counter() - began
+        assert answers == ["identical"] * len(logs)
+    with capsys.disabled():
+        print(f"\naudit: two workers {seconds[1] / seconds[2]:.2f} times one")
+
+
+PEAK = """
+import resource, sys
+from pathlib import Path
+from cell.programs.audit.log import audit_log
+audit = audit_log(Path(sys.argv[1]))
+print(audit.holes, audit.answer, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+"""
+
+
+def test_memory_for_two_hundred_holes(tmp_path, holes, capsys):
+    many = tuple(replace(holes[k % 24], index=k) for k in range(200))
+    log = record_body(tmp_path / "long.rrd", holes=many)
+    said = subprocess.run([sys.executable, "-c", PEAK, str(log)], capture_output=True, text=True,
+                          check=True).stdout.split()
+    with capsys.disabled():
+        print(f"\naudit: peak {float(said[2]):.0f} MB for {said[0]} holes, "
+              f"{log.stat().st_size / 1e6:.0f} MB of recording")
+    assert said[:2] == ["200", "identical"]
