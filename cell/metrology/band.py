@@ -14,7 +14,7 @@ import numpy as np
 
 from cell.core.geometry import Array
 from cell.core.observation import Image
-from cell.metrology.arrays import Grey, Mask
+from cell.metrology.arrays import Grey, Indices
 from cell.metrology.ellipse import Ellipse
 
 SMOOTHING = 0.8  # px, of the picture before edges are looked for
@@ -52,8 +52,8 @@ class Band:
         inner, outer = self.offsets < -beside, self.offsets > beside
         return self.grey[:, inner].mean(axis=1), self.grey[:, outer].mean(axis=1)
 
-    def __getitem__(self, rays: Mask) -> Band:
-        """Return the profiles of a mask."""
+    def __getitem__(self, rays: Indices) -> Band:
+        """Return some of the profiles."""
         return Band(self.ellipse, self.t[rays], self.offsets, self.grey[rays])
 
 

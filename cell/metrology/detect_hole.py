@@ -24,7 +24,8 @@ from cell.metrology.gates import (
     check_round,
     check_whole,
 )
-from cell.metrology.profile import Profile, fit_profile, locate_edges
+from cell.metrology.profile import Profile
+from cell.metrology.profile_fit import fit_profile, locate_edges
 from cell.metrology.reasons import refusal
 from cell.metrology.rim_fit import agree, settle
 from cell.metrology.spread import correlation_length, robust_sigma

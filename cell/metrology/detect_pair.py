@@ -76,8 +76,8 @@ def _at_depth(expected: Expected, ridge: Ridge, sensor: SensorModel) -> Expected
     """Add how far away the sheet is, which the stripe tells, where nothing else does."""
     if expected.centre is not None:
         return expected
-    length = sensor.camera.image_size[1 if ridge.upright else 0]
-    on_sheet = sensor.light_plane.meet(sensor.camera.rays(ridge.points(length)))
+    some = ridge.points(ridge.length)[::16]
+    on_sheet = sensor.light_plane.meet(sensor.camera.rays(some))
     return replace(expected, centre=np.median(on_sheet, axis=0), centre_sigma=ANYWHERE)
 
 

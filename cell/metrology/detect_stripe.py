@@ -71,12 +71,6 @@ def follow_stripe(image: Image, ridge: Ridge, rim: Rim, sensor: SensorModel,
                   quality={"height": ridge.height, "gap_px": gap, "share": ridge.share})
 
 
-def centre_stripe(image: Image, ridge: Ridge, v: Array) -> tuple[Array, Array]:
-    """Locate a stripe on lines v (n,) of the image: pixels (n, 2), and its height (n,) in grey."""
-    u, height = _centres(_cut(image, ridge, v))
-    return ridge.pixels(u, v), height
-
-
 def _gap(along: Array, miss: Array, side: Array) -> tuple[float, float]:
     """Compare the two sides where they would meet: the distance, and its standard deviation."""
     middle = (along[side < 0].max() + along[side > 0].min()) / 2.0
@@ -160,7 +154,7 @@ def _straightness(points: Array, camera: CameraModel, upright: bool) -> tuple[Ar
     focal = float(camera.matrix[0, 0] if upright else camera.matrix[1, 1])
     rows = np.column_stack([np.ones_like(along), along])
     miss, scale = across - np.median(across), 1.0
-    for _ in range(8):
+    for _ in range(5):
         scale = max(1e-3 / focal, robust_sigma(miss))
         weight = np.sqrt(tukey_weights(miss, scale))
         line = np.linalg.lstsq(rows * weight[:, None], across * weight, rcond=None)[0]

@@ -18,7 +18,6 @@ from cell.metrology.arrays import Grey, Mask
 BIN = 4                # lines along the stripe that are averaged before the search
 NARROW, WIDE = 2.0, 8.0  # px, the scales that a ridge stands out between
 MOST = 2               # ridges
-PEAKS = 2              # ridges kept a line: the stripe, and one on what lies behind the hole
 DRAWS = 300
 TOLERANCE = 2.5        # px, lens distortion over the length included
 SIGNIFICANCE = 6.0     # of a ridge above the image's own unrest
@@ -120,15 +119,18 @@ def _along(response: Grey, offset: float, slope: float) -> Array:
 
 
 def _candidates(response: Grey) -> tuple[Array, Array, Array]:
-    """Give the highest ridges of each line that stand out: u, line and height."""
+    """Give the two highest ridges of each line that stand out: u, line and height."""
     unrest = 1.4826 * float(np.median(np.abs(response[::2, ::4]))) + 0.05
     summit = ((response[:, 1:-1] > response[:, :-2]) & (response[:, 1:-1] >= response[:, 2:])
               & (response[:, 1:-1] > SIGNIFICANCE * unrest))
     heights = np.where(summit, response[:, 1:-1], np.float32(0.0))
-    column = np.argpartition(-heights, PEAKS, axis=1)[:, :PEAKS]
-    line = np.repeat(np.arange(len(response)), PEAKS)
-    height = np.take_along_axis(heights, column, axis=1).ravel().astype(np.float64)
-    column = column.ravel()
+    line = np.arange(len(response))
+    first = heights.argmax(axis=1)
+    tops = heights[line, first]
+    heights[line, first] = 0.0
+    second = heights.argmax(axis=1)
+    height = np.concatenate([tops, heights[line, second]]).astype(np.float64)
+    column, line = np.concatenate([first, second]), np.concatenate([line, line])
     real = height > 0.0
     return column[real].astype(np.float64) + 1.0, line[real].astype(np.float64), height[real]
 

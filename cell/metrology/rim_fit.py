@@ -56,7 +56,7 @@ def settle(band: Band, edges: Edges, *, floor: float,
     rows = _design(band, free)[edges.ray]
     step: Array = np.zeros(free)
     miss, scale = edges.offset, 1.0
-    for _ in range(8):
+    for _ in range(5):
         miss = edges.offset - rows @ step
         scale = max(floor, robust_sigma(miss))
         weight = np.sqrt(tukey_weights(miss, scale))

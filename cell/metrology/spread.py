@@ -12,7 +12,13 @@ NEGLIGIBLE = 0.1  # correlation
 
 def robust_sigma(values: Array) -> float:
     """Estimate the standard deviation from the median of the absolute deviations."""
-    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
+    return 1.4826 * middle(np.abs(values - middle(values)))
+
+
+def middle(values: Array) -> float:
+    """Give the (upper) median: as `np.median`, at a fraction of its cost."""
+    half = len(values) // 2
+    return float(np.partition(values, half)[half])
 
 
 def correlation_length(residuals: Array) -> float:

@@ -1,0 +1,127 @@
+"""The rim fitted to the pixels around it: ellipse, blur and wall together, then ray by ray.
+
+Each ray has two levels of its own; the sheet's end lies on an ellipse; the wall's width follows
+from the shift of the far rim; its share of the step is smooth round the rim; the blur is common.
+Least squares over the pixels is the maximum likelihood for a camera's noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from cell.core.geometry import Array
+from cell.metrology.arrays import Mask
+from cell.metrology.band import Band
+from cell.metrology.profile import Profile, fit_levels, shape_step, without_levels
+from cell.metrology.spread import middle, tukey_weights
+from cell.metrology.wall import Wall
+
+STEPS = 7
+SETTLED = 0.005       # px and shares: below, the fit has arrived
+THINNED = 2           # every second ray tells enough of blur and wall
+SHARE_SIGMA, SHARE_SWING = 0.2, 0.1   # of k before looking, and of its change round the rim
+DARKEST, BRIGHTEST = -0.6, 1.3        # k
+CLEARLY = 0.95                        # of the misfit, to be better
+NOTABLE_WALL = 1.5                    # px
+NARROWEST, WIDEST, USUAL_BLUR = 0.4, 6.0, 1.2  # px
+PIXELS_PER_ERROR = 30.0  # texture and smoothing: so many pixels go wrong together
+
+
+class RimModel:
+    """The eleven numbers of a rim: ellipse 5, blur, shift of the far rim 2, wall's share 3."""
+
+    def __init__(self, band: Band, wall: Wall) -> None:
+        self.shrink = wall.shrink
+        self.design, self.normals = band.ellipse.design(band.t), band.ellipse.normals(band.t)
+        self.around = np.column_stack([np.ones_like(band.t), np.cos(band.t), np.sin(band.t)])
+        self.prior = np.array([0.0] * 5 + [USUAL_BLUR, *wall.shift, wall.share, 0.0, 0.0])
+        self.sigma = np.array([np.inf] * 6 + [wall.sigma] * 2
+                              + [SHARE_SIGMA, SHARE_SWING, SHARE_SWING])
+
+    def read(self, x: Array) -> Profile:
+        """Turn the eleven numbers into what each ray shows."""
+        return Profile(self.design @ x[:5], float(np.clip(x[5], NARROWEST, WIDEST)),
+                       self.shrink - self.normals @ x[6:8],
+                       np.clip(self.around @ x[8:], DARKEST, BRIGHTEST))
+
+    def rows(self) -> Array:
+        """Give how edge, blur, width and share of each ray follow from the numbers (n, 4, 11)."""
+        rows = np.zeros((len(self.design), 4, 11))
+        rows[:, 0, :5], rows[:, 1, 5] = self.design, 1.0
+        rows[:, 2, 6:8], rows[:, 3, 8:] = -self.normals, self.around
+        return rows
+
+    def onto_near_rim(self, wall: Wall) -> Array:
+        """Give the move from the outline of what is seen through the bore to the near rim."""
+        outward = np.maximum(self.shrink - self.normals @ wall.shift, 0.0)
+        move = np.zeros_like(self.prior)
+        move[:5] = np.linalg.lstsq(self.design, outward, rcond=None)[0]
+        return move
+
+
+def fit_profile(band: Band, rays: Mask, walls: list[Wall]) -> Profile:
+    """Fit ellipse, blur and wall together to the pixels of the `rays` (n,) that agree.
+
+    Where a wall of some width is to be expected, the band's ellipse may lie on its far side: the
+    fit starts from both. Of all starts, the one that explains the pixels clearly better wins.
+
+    Args:
+        band: the profiles.
+        rays: which of them to use.
+        walls: what the wall may be; the first is preferred.
+    """
+    sparse = band[np.nonzero(rays)[0][::THINNED]]
+    best, least, chosen = np.zeros(11), np.inf, walls[0]
+    for wall in walls:
+        model = RimModel(sparse, wall)
+        starts = [model.prior]
+        if wall.widest > NOTABLE_WALL:
+            starts.append(model.prior + model.onto_near_rim(wall))
+        for start in starts:
+            state, misfit = _descend(model, sparse, start)
+            if misfit < CLEARLY * least:
+                best, least, chosen = state, misfit, wall
+    return RimModel(band, chosen).read(best)
+
+
+def _descend(model: RimModel, band: Band, state: Array) -> tuple[Array, float]:
+    """Fit from a start (Gauss-Newton): the numbers, and the usual misfit of a ray in grey."""
+    rows = model.rows()
+    flat = rows.reshape(-1, len(state))
+    for _ in range(STEPS):
+        step = shape_step(band.offsets, model.read(state))
+        miss, height = fit_levels(band.grey, step.shape)
+        slopes = without_levels(step.slopes, step.shape)
+        rough = np.sqrt(np.einsum("nm,nm->n", miss, miss) / miss.shape[1])
+        scale = max(middle(rough), 1e-3)
+        weight = tukey_weights(np.maximum(rough - scale, 0.0), scale)
+        weighted = slopes * (weight * height)[:, None, None]
+        products = weighted @ (slopes * height[:, None, None]).swapaxes(1, 2)
+        pulls = (weighted @ miss[..., None])[..., 0]
+        stiff = PIXELS_PER_ERROR * (scale / model.sigma) ** 2
+        normal = flat.T @ (products @ rows).reshape(flat.shape)
+        right = flat.T @ pulls.ravel() + stiff * (model.prior - state)
+        move = np.clip(np.linalg.solve(normal + np.diag(stiff + 1e-9), right), -0.5, 0.5)
+        state = state + move
+        if np.abs(move).max() < SETTLED:
+            break
+    miss, _ = fit_levels(band.grey, shape_step(band.offsets, model.read(state)).shape)
+    return state, float(np.sqrt((miss**2).mean(axis=1)).mean())
+
+
+def locate_edges(band: Band, profile: Profile) -> tuple[Array, Array, Array]:
+    """Locate the sheet's end on every ray by itself: offset (n,) px; and how high its step is and
+    how badly it fits, both (n,) in grey values.
+    """
+    found = profile
+    for _ in range(2):
+        step = shape_step(band.offsets, found)
+        miss, height = fit_levels(band.grey, step.shape)
+        slope = without_levels(step.slopes[:, :1], step.shape)[:, 0] * height[:, None]
+        square = np.maximum(np.einsum("nm,nm->n", slope, slope), 1e-9)
+        move = np.einsum("nm,nm->n", slope, miss) / square
+        found = replace(found, edge=found.edge + np.clip(move, -1.0, 1.0))
+    miss, height = fit_levels(band.grey, shape_step(band.offsets, found).shape)
+    return found.edge, height, np.sqrt((miss**2).mean(axis=1))
