@@ -15,7 +15,7 @@ from cell.core.geometry import Array
 from cell.core.observation import Image
 from cell.core.optics import CameraModel
 from cell.metrology.detect_stripe import HALF_WINDOW, centre_stripe
-from cell.metrology.ridge import find_ridge
+from cell.metrology.ridge import find_ridges
 from cell.metrology.spread import robust_sigma, tukey_weights
 
 INK = 0.35            # of the paper's brightness; darker lines are left out
@@ -40,9 +40,10 @@ def detect_board_stripe(stripe: Image, ring: Image, camera: CameraModel, *,
     """
     paper = _paper(ring)
     flat = _flatten(stripe, paper)
-    ridge = find_ridge(flat, upright=upright)
-    if ridge is None:
+    ridges = find_ridges(flat, upright=upright)
+    if not ridges:
         raise UnmeasurableError("no_stripe", "no laser stripe on the board")
+    ridge = ridges[0]
     length, width = stripe.shape if upright else stripe.shape[::-1]
     v = np.arange(length, dtype=np.float64)
     u = ridge.across(v)
