@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,10 +11,13 @@ from typing import TYPE_CHECKING, Any
 import typer
 from rich.table import Table
 
+from cell.cli.calibrate_operator import TerminalOperator
+from cell.cli.calibrate_sets import CELL, FOLDER, JSON, activate, diff, history, rollback
 from cell.cli.words import answers, console, print_json
 
 if TYPE_CHECKING:
     from cell.metrology.hand_eye_calibration import HandEyeAnswer
+    from cell.programs.calibration.wizard import What
 
 ACCEPTED, REFUSED = 0, 1
 STYLE = {"pass": "green", "solved": "green", "warn": "yellow", "refuse": "red"}
@@ -21,6 +25,27 @@ STYLE = {"pass": "green", "solved": "green", "warn": "yellow", "refuse": "red"}
 calibrate = typer.Typer(
     name="calibrate", no_args_is_help=True, rich_markup_mode="markdown",
     help="Calibrate the camera, the light plane, the hand-eye transform and the body registration.")
+
+
+PLAN = typer.Option(None, "--plan", metavar="FILE", help="How to run the session: views, goal, "
+                                                         "gates, reason; every key has a default.")
+YES = typer.Option(False, "--yes", help="Ask nobody: everything that was planned is agreed to.")
+RESUME = typer.Option(False, "--resume", help="Go on with the newest session of the cell.")
+SPEED = typer.Option(1.0, "--speed", min=0.01, help="Run a simulated cell this many times faster "
+                                                    "than real time.")
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The options that all wizard commands share."""
+
+    cell: str
+    plan: Path | None
+    yes: bool
+    resume: bool
+    speed: float
+    folder: Path
+    as_json: bool
 
 
 class Gates(StrEnum):
@@ -37,6 +62,46 @@ class Mount(StrEnum):
     static = "static"
 
 
+calibrate.command()(history)
+calibrate.command()(diff)
+calibrate.command()(activate)
+calibrate.command()(rollback)
+
+
+@calibrate.command("camera")
+def camera(cell: str = CELL, plan: Path | None = PLAN, yes: bool = YES, resume: bool = RESUME,
+           speed: float = SPEED, folder: Path = FOLDER, as_json: bool = JSON) -> None:
+    """Calibrate the camera alone, for a look: a set needs light plane and hand-eye too (`all`).
+
+    Exit code: 0 accepted, 1 refused, 2 bad input, 3 device fault.
+    """
+    _run("camera", Asked(cell, plan, yes, resume, speed, folder, as_json))
+
+
+@calibrate.command("light-plane")
+def light_plane(cell: str = CELL, plan: Path | None = PLAN, yes: bool = YES, resume: bool = RESUME,
+                speed: float = SPEED, folder: Path = FOLDER, as_json: bool = JSON) -> None:
+    """Calibrate the light plane with the active camera; makes a set.
+
+    Exit code: 0 accepted, 1 refused, 2 bad input, 3 device fault.
+    """
+    _run("light-plane", Asked(cell, plan, yes, resume, speed, folder, as_json))
+
+
+@calibrate.command("all")
+def everything(cell: str = CELL, plan: Path | None = PLAN, yes: bool = YES, resume: bool = RESUME,
+               speed: float = SPEED, folder: Path = FOLDER, as_json: bool = JSON) -> None:
+    """Calibrate camera, light plane and hand-eye from one session; makes a set.
+
+    You are asked to confirm robot, board and mounting, then to jog until the board fills the view.
+    The views are planned for the least uncertainty, every move checked, and driven after you agree.
+    With `--plan FILE --yes` nobody is asked. A session that was cut off goes on with `--resume`.
+
+    Exit code: 0 accepted, 1 refused (with reasons), 2 bad input, 3 device fault.
+    """
+    _run("all", Asked(cell, plan, yes, resume, speed, folder, as_json))
+
+
 @calibrate.command("hand-eye")
 def hand_eye(
     recorded: Path | None = typer.Option(None, "--from", metavar="FOLDER",
@@ -45,9 +110,12 @@ def hand_eye(
                                                  "coarse one (large robots and distances)."),
     mount: Mount | None = typer.Option(None, help="Where the camera sits, if the folder does not "
                                                   "say: on the flange, or static."),
-    as_json: bool = typer.Option(False, "--json", help="Print one JSON object."),
+    cell: str = CELL, plan: Path | None = PLAN, yes: bool = YES, resume: bool = RESUME,
+    speed: float = SPEED, folder: Path = FOLDER, as_json: bool = JSON,
 ) -> None:
     """Find where the camera sits on the flange (or in the base, for a static camera).
+
+    Without `--from`, the wizard takes the views with the active camera, and makes a set.
 
     A recorded session is a folder with base_from_flange.csv, views.npz and camera.yaml, or with
     camera_from_board.csv for poses alone. It is diagnosed before it is solved: units, conventions,
@@ -56,7 +124,12 @@ def hand_eye(
     Exit code: 0 accepted, 1 refused (with reasons), 2 bad input.
     """
     if recorded is None:
-        raise typer.BadParameter("say --from FOLDER")
+        _run("hand-eye", Asked(cell, plan, yes, resume, speed, folder, as_json))
+    else:
+        _solve_recorded(recorded, gates, mount, as_json)
+
+
+def _solve_recorded(recorded: Path, gates: Gates, mount: Mount | None, as_json: bool) -> None:
     from cell.metrology.hand_eye_calibration import calibrate_hand_eye
     from cell.programs.calibration.recorded import read_gates, read_recorded
 
@@ -67,6 +140,30 @@ def hand_eye(
     else:
         _show_answer(answer, read.notes)
     raise typer.Exit(REFUSED if answer.verdict == "refuse" else ACCEPTED)
+
+
+def _run(what: What, asked: Asked) -> None:
+    """Run the wizard, at the terminal or by a plan."""
+    from cell.archive.files import read_text
+    from cell.core.documents.calibration_session import CalibrationPlan
+    from cell.core.documents.text import parse
+    from cell.programs.calibration.operators import Unattended
+    from cell.programs.calibration.wizard import Request, run_wizard
+
+    plan = (parse(CalibrationPlan, read_text(asked.plan), str(asked.plan)) if asked.plan
+            else CalibrationPlan())
+    terminal = TerminalOperator(console)
+    finished = run_wizard(Request(what, asked.cell, plan, asked.folder, asked.speed, asked.resume),
+                          Unattended(terminal.tell) if asked.yes else terminal)
+    solution = finished.solution
+    if asked.as_json:
+        print_json({"verdict": solution.verdict, "reasons": list(solution.reasons),
+                    "set": finished.set_id, "active": finished.active,
+                    "session": str(finished.session),
+                    "gates": {step: [{**vars(gate), "value": _number(gate.value)}
+                                     for gate in gates]
+                              for step, gates in solution.gates.items()}})
+    raise typer.Exit(REFUSED if solution.verdict == "refuse" else ACCEPTED)
 
 
 def _answer_as_json(answer: HandEyeAnswer, notes: tuple[str, ...]) -> dict[str, Any]:
