@@ -24,7 +24,7 @@ from cell.metrology.joint_rows import Circle, Sight, StripeSight
 from cell.metrology.posterior import Posterior, solve_all
 from cell.metrology.reasons import refusal
 from cell.metrology.trace import trace_circle
-from cell.metrology.uncertainty import CLEAN, FORM_SIGMA, joint_budget, shares, total
+from cell.metrology.uncertainty import FORM_SIGMA, joint_budget, one_sided, shares, total
 
 RADIUS_SIGMA = 0.1  # mm: weak on a whole rim, decisive on an arc
 UNKNOWN_RADIUS_SIGMA = 100.0  # mm
@@ -91,8 +91,7 @@ def _tangents(normal: Array, stripe: StripeSight) -> Array:
 
 def _prior(start: Circle, rim: Rim, expected: Expected) -> Prior:
     mm_per_px = start.radius / float(np.sqrt(rim.ellipse[2] * rim.ellipse[3]))
-    beside = max(0.0, rim.ambiguity - CLEAN) * mm_per_px
-    form_sigma = float(np.hypot(FORM_SIGMA, beside / 2.0))
+    form_sigma = float(np.hypot(FORM_SIGMA, one_sided(rim.ambiguity) * mm_per_px))
     radius = start.radius if expected.radius is None else expected.radius
     radius_sigma = UNKNOWN_RADIUS_SIGMA if expected.radius is None else RADIUS_SIGMA
     return Prior(np.zeros(2), np.full(2, normal_sigma(expected)), form_sigma, radius,

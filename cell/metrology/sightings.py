@@ -21,6 +21,7 @@ from cell.metrology.joint import Shot, solve_circle
 from cell.metrology.reasons import refusal
 
 STILL_MM, STILL_RAD = 0.05, np.radians(0.02)  # an arm that stands is far quieter
+NEARBY = 0.3  # of an arm's error is what two poses a few millimetres apart do not share
 ELSEWHERE = 0.5  # mm: pictures from one place share their speckle, so that one stripe is enough
 
 
@@ -143,5 +144,5 @@ def _loosened(stripe: Stripe, calibration: Calibration) -> Stripe:
     sensor = calibration.sensor.model
     px_per_mm = sensor.camera.matrix[0, 0] * np.tan(sensor.triangulation_angle) \
         / sensor.working_distance
-    way = np.sqrt(2.0) * calibration.flange_sigmas[0]
+    way = NEARBY * calibration.flange_sigmas[0]
     return replace(stripe, bias=float(np.hypot(stripe.bias, way * px_per_mm)))

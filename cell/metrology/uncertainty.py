@@ -33,9 +33,8 @@ Budget: TypeAlias = dict[str, Array]
 """Covariances (4, 4) of x, y, z and the radius by source, mm²; sources are independent."""
 
 FORM_SIGMA = 0.004  # mm, each wave of the rim: what punched and drilled holes show
-CLEAN = 0.45  # px of ambiguity that any rim shows
-CENTRE_DOUBT, RADIUS_DOUBT = 0.025, 0.1  # px: what light and edge break do to a clean rim
-CENTRE_SHARE, RADIUS_SHARE = 0.35, 0.6  # of the ambiguity, at most
+CENTRE_DOUBT, RADIUS_DOUBT = 0.02, 0.07  # px: what light and edge break do to a clean rim
+AMBIGUITY, SHARE = (0.3, 0.8), (0.17, 0.35)  # px, and the share of it that moves a centre
 SHOWN = [0, 1, 2, RADIUS]
 
 
@@ -96,14 +95,20 @@ def two_step_budget(located: Array, solution: Solution, normal_sigma: float, amb
     return budget | {"form": two_points, "method": np.asarray(np.transpose(errors) @ errors)}
 
 
+def one_sided(ambiguity: float) -> float:
+    """Say by how much (px, standard) an ambiguous edge displaces a rim; the radius, by twice that.
+
+    From rendered scenes: little of a small ambiguity does, for it goes round the rim.
+    """
+    return ambiguity * float(np.interp(ambiguity, AMBIGUITY, SHARE))
+
+
 def _edge_ambiguity(solution: Solution, ambiguity: float) -> Array:
     """Let the seen edge lie beside the bore's all round, and more so on one side."""
     rim = solution.seen[0]
     toward = rim.rows.toward
-    beyond = max(0.0, ambiguity - CLEAN)
-    constant = np.hypot(min(beyond, RADIUS_SHARE * ambiguity), RADIUS_DOUBT)
-    one_sided = np.hypot(min(beyond, CENTRE_SHARE * ambiguity), CENTRE_DOUBT)
-    sigma = np.array([constant, one_sided, one_sided])
+    aside = one_sided(ambiguity)
+    sigma = np.hypot([2.0 * aside, aside, aside], [RADIUS_DOUBT, CENTRE_DOUBT, CENTRE_DOUBT])
     causes = np.column_stack([np.ones(len(toward)), toward]) * sigma
     return _spread(solution.response(rim, causes), np.eye(3))
 

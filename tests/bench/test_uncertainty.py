@@ -88,7 +88,7 @@ def test_rendered_scenes(capsys):
     assert refused <= 0.02 * RENDERED_SCENES
     assert np.mean(ratios < 2) > 0.92
     assert np.mean(ratios < 3) > 0.98
-    assert np.all((np.median(ratios, axis=0) > 0.3) & (np.median(ratios, axis=0) < 0.9))
+    assert np.all((np.median(ratios, axis=0) > 0.35) & (np.median(ratios, axis=0) < 0.9))
 
 
 def test_rendered_recentred(capsys):
