@@ -68,7 +68,7 @@ def detect_rim(image: Image, hole: Hole, camera: CameraModel, expected: Expected
         walls += suspect_walls(walls[0])
     band = _profiles(hole.patch, rough, max(wall.widest for wall in walls))
     rays = np.repeat(seen, -(-len(band.t) // len(seen)))[:len(band.t)]
-    profile = fit_profile(band, rays, walls)
+    profile = fit_profile(band, rays, walls, doubled=doubled or hole.inside > 0)
     edge, height, misfit = locate_edges(band, profile)
     step = abs(float(np.median(height[rays])))
     check_clear(step, float(np.median(misfit[rays])), profile.blur)

@@ -35,14 +35,14 @@ def detect_pair(hole_image: Image, stripe_image: Image, sensor: SensorModel,
     if not ridges:
         raise refusal("no_laser")
     check_lit(hole_image)
-    ridge, hole = _choose(ridges, hole_image, sensor, expected)
-    rim = detect_rim(hole_image, hole, sensor.camera, _at_depth(expected, ridge, sensor))
+    ridge, hole, placed = _choose(ridges, hole_image, sensor, expected)
+    rim = detect_rim(hole_image, hole, sensor.camera, placed)
     return rim, follow_stripe(stripe_image, ridge, rim, sensor, expected)
 
 
 def _choose(ridges: list[Ridge], image: Image, sensor: SensorModel,
-            expected: Expected) -> tuple[Ridge, Hole]:
-    """Choose the stripe on the sheet, and the hole that it crosses."""
+            expected: Expected) -> tuple[Ridge, Hole, Expected]:
+    """Choose the stripe on the sheet, and the hole that it crosses; tell its depth as well."""
     reasons: list[Reason] = []
     for ridge in ridges:
         placed = _at_depth(expected, ridge, sensor)
@@ -50,7 +50,7 @@ def _choose(ridges: list[Ridge], image: Image, sensor: SensorModel,
         if hole is not None:
             if hole.coverage < COMPLETE:
                 _check_radius(ridge, image, sensor, expected)
-            return ridge, hole
+            return ridge, hole, placed
         reasons.append("laser_misses_hole" if beside else why_no_hole(image, ridge))
     _check_radius(ridges[0], image, sensor, expected)
     raise refusal(reasons[0])

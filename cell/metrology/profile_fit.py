@@ -61,7 +61,7 @@ class RimModel:
         return move
 
 
-def fit_profile(band: Band, rays: Mask, walls: list[Wall]) -> Profile:
+def fit_profile(band: Band, rays: Mask, walls: list[Wall], *, doubled: bool = True) -> Profile:
     """Fit ellipse, blur and wall together to the pixels of the `rays` (n,) that agree.
 
     Where a wall of some width is to be expected, the band's ellipse may lie on its far side: the
@@ -71,13 +71,14 @@ def fit_profile(band: Band, rays: Mask, walls: list[Wall]) -> Profile:
         band: the profiles.
         rays: which of them to use.
         walls: what the wall may be; the first is preferred.
+        doubled: whether two rims may show.
     """
     sparse = band[np.nonzero(rays)[0][::THINNED]]
     best, least, chosen = np.zeros(11), np.inf, walls[0]
     for wall in walls:
         model = RimModel(sparse, wall)
         starts = [model.prior]
-        if wall.widest > NOTABLE_WALL:
+        if doubled and wall.widest > NOTABLE_WALL:
             starts.append(model.prior + model.onto_near_rim(wall))
         for start in starts:
             state, misfit = _descend(model, sparse, start)

@@ -60,10 +60,11 @@ def _ballots(small: Image) -> tuple[Indices, Indices, Grey, Grey, Grey]:
     smooth = cv2.GaussianBlur(small, (0, 0), 0.8).astype(np.float32)
     g_x, g_y = cv2.Sobel(smooth, cv2.CV_32F, 1, 0), cv2.Sobel(smooth, cv2.CV_32F, 0, 1)
     size = cv2.magnitude(g_x, g_y)
-    strong = float(np.quantile(size, 1.0 - EDGE_SHARE / 5.0))
-    y, x = np.nonzero(size > max(float(np.quantile(size, 1.0 - EDGE_SHARE)), 1e-3))
+    usual, strong = np.quantile(size[::2, ::2], [1.0 - EDGE_SHARE, 1.0 - EDGE_SHARE / 5.0])
+    y, x = np.nonzero(size > max(float(usual), 1e-3))
     length = size[y, x]
-    return x, y, g_x[y, x] / length, g_y[y, x] / length, np.minimum(length / max(strong, 1e-3), 1.0)
+    weight = np.minimum(length / max(float(strong), 1e-3), 1.0)
+    return x, y, g_x[y, x] / length, g_y[y, x] / length, weight
 
 
 def _layer(ballots: tuple[Indices, Indices, Grey, Grey, Grey], radius: float, inside: int,
