@@ -14,9 +14,9 @@ from cell.core.errors import UnmeasurableError
 from cell.core.geometry import Array
 from cell.core.observation import Image
 from cell.core.optics import CameraModel
-from cell.metrology.detect_stripe import HALF_WINDOW, centre_stripe
 from cell.metrology.ridge import find_ridges
 from cell.metrology.spread import robust_sigma, tukey_weights
+from cell.metrology.stripe_centres import HALF_WINDOW, centre_stripe
 
 INK = 0.35            # of the paper's brightness; darker lines are left out
 CLIPPED = 250         # grey, from which a stripe has lost its summit
@@ -49,8 +49,11 @@ def detect_board_stripe(stripe: Image, ring: Image, camera: CameraModel, *,
     u = ridge.across(v)
     v = v[(u > HALF_WINDOW + 1) & (u < width - HALF_WINDOW - 2)]
     lines = v[_on_paper(paper if upright else paper.T, ridge.across(v), v)]
-    pixels, height = centre_stripe(flat, ridge, lines)
-    pixels = pixels[height > 0.3 * np.median(height)] if len(pixels) else pixels
+    if len(lines) < LEAST_LINES:
+        raise UnmeasurableError("stripe_too_short", f"{len(lines)} lines of stripe on paper")
+    across, height = centre_stripe(flat, ridge, lines)
+    bright = height > 0.3 * np.median(height)
+    pixels = ridge.pixels(across[bright], lines[bright])
     if len(pixels) < LEAST_LINES:
         raise UnmeasurableError("stripe_too_short", f"{len(pixels)} lines of stripe on paper")
     return _straight(pixels, camera, upright)
