@@ -1,7 +1,7 @@
-"""The outcomes in a stop record: those of its holes, said once.
+"""What a run's papers say twice, and a file says once.
 
-A judgement repeats the outcome of every hole that it was made from. In the file it refers to the
-hole instead, and is given back whole.
+A judgement repeats the outcome of every hole that it was made from, and the two-step estimate
+repeats the points of the other. In the file the repetition is a reference; read back, it is whole.
 """
 
 from __future__ import annotations
@@ -9,11 +9,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from cell.core.documents.record import HoleRecord, Stop
-from cell.core.documents.result import NotMeasured, Outcome
+from cell.core.documents.result import Measured, NotMeasured, Outcome
+from cell.core.geometry import Array
 
 ECHO = "as_recorded"
 """The reason that stands for: see the hole's own record."""
+
+SAME = np.zeros((0, 0, 0, 0))
+"""Stands for: the points of this name in the estimate that counts."""
 
 
 def outcomes_of(record: HoleRecord) -> dict[str, Outcome]:
@@ -21,7 +27,7 @@ def outcomes_of(record: HoleRecord) -> dict[str, Outcome]:
     return {record.observation.hole_id: record.outcome} if record.attempts else {}
 
 
-def refer_to_holes(stop: Stop, outcomes: Mapping[str, Outcome]) -> Stop:
+def say_stop_once(stop: Stop, outcomes: Mapping[str, Outcome]) -> Stop:
     """Replace every outcome that is the one of its hole by a reference."""
     def refer(outcome: Outcome) -> Outcome:
         own = outcomes.get(outcome.hole_id)
@@ -30,7 +36,7 @@ def refer_to_holes(stop: Stop, outcomes: Mapping[str, Outcome]) -> Stop:
     return _with_outcomes(stop, refer)
 
 
-def resolve_to_holes(stop: Stop, outcomes: Mapping[str, Outcome]) -> Stop:
+def complete_stop(stop: Stop, outcomes: Mapping[str, Outcome]) -> Stop:
     """Put the outcomes of the holes back.
 
     Raises:
@@ -46,9 +52,50 @@ def resolve_to_holes(stop: Stop, outcomes: Mapping[str, Outcome]) -> Stop:
     return _with_outcomes(stop, resolve)
 
 
+def say_hole_once(record: HoleRecord) -> HoleRecord:
+    """Replace the points that both estimates share by a reference."""
+    def refer(points: Array, counting: Array | None) -> Array:
+        same = counting is not None and points.shape == counting.shape \
+            and points.tobytes() == counting.tobytes()
+        return SAME if same else points
+
+    return _with_traces(record, refer)
+
+
+def complete_hole(record: HoleRecord) -> HoleRecord:
+    """Put the shared points back.
+
+    Raises:
+        ValueError: a reference to points that are not there.
+    """
+    def resolve(points: Array, counting: Array | None) -> Array:
+        if points.shape != SAME.shape:
+            return points
+        if counting is None:
+            raise ValueError("an estimate refers to points that are not there")
+        return counting
+
+    return _with_traces(record, resolve)
+
+
 def _with_outcomes(stop: Stop, change: Callable[[Outcome], Outcome]) -> Stop:
     if stop.result is None:
         return stop
     features = tuple(replace(feature, outcome=change(feature.outcome))
                      for feature in stop.result.features)
     return replace(stop, result=replace(stop.result, features=features))
+
+
+def _with_traces(record: HoleRecord, change: Callable[[Array, Array | None], Array]) -> HoleRecord:
+    return replace(record, attempts=tuple(
+        replace(attempt, outcome=_with_trace(attempt.outcome, change))
+        for attempt in record.attempts))
+
+
+def _with_trace(outcome: Outcome, change: Callable[[Array, Array | None], Array]) -> Outcome:
+    if not isinstance(outcome, Measured):
+        return outcome
+    counting = outcome.located.trace
+    trace = {name: change(points, counting.get(name))
+             for name, points in outcome.two_step.trace.items()}
+    return replace(outcome, two_step=replace(outcome.two_step, trace=trace))

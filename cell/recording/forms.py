@@ -37,15 +37,30 @@ class Form:
     value: Callable[[Plain], Value]
 
 
-def canonical(plain: object) -> bytes:
-    """Write plain values as the bytes that are hashed: JSON, keys sorted, floats by their shortest
-    exact digits.
+def canonical(plain: Plain) -> bytes:
+    """Write plain values as the bytes that are hashed: JSON, keys sorted, a float by its shortest
+    exact digits, a row of float64 by its bytes (little-endian) in hexadecimal.
     """
-    return json.dumps(plain, sort_keys=True, separators=(",", ":"), default=_numbers).encode()
+    return json.dumps(plain, sort_keys=True, separators=(",", ":"), default=_row_bytes).encode()
 
 
-def _numbers(value: np.ndarray[Any, Any] | np.generic) -> Plain:
-    return value.tolist()
+def _row_bytes(row: Array) -> str:
+    return row.astype("<f8").tobytes().hex()
+
+
+def plain_of(scalar: pa.Scalar) -> Plain:
+    """Take plain values out of a column, as `Form.plain` makes them: rows of float64 as arrays."""
+    if not scalar.is_valid:
+        return None
+    if pa.types.is_struct(scalar.type):
+        return {name: plain_of(scalar[name]) for name in scalar.type.names}
+    if pa.types.is_map(scalar.type):
+        return [(each["key"].as_py(), plain_of(each["value"])) for each in scalar.values]
+    if not pa.types.is_list(scalar.type):
+        return scalar.as_py()
+    if scalar.type.value_type == pa.float64():
+        return scalar.values.to_numpy(zero_copy_only=False)
+    return [plain_of(each) for each in scalar.values]
 
 
 def as_recorded(record: Value) -> Value:
@@ -125,6 +140,9 @@ def _alternatives(kinds: tuple[Any, ...]) -> Form:
 
 def _sequence(kinds: tuple[Any, ...]) -> Form:
     form = form_of(kinds[0])
+    if form is SIMPLE[float]:
+        return Form(pa.list_(form.column), lambda values: np.array(values, dtype=np.float64),
+                    lambda plain: tuple(plain.tolist()))
     return Form(pa.list_(form.column),
                 lambda values: [form.plain(value) for value in values],
                 lambda plain: tuple(form.value(each) for each in plain))
@@ -146,6 +164,10 @@ def _array(plain: dict[str, Any]) -> Array:
     return np.array(plain["values"], dtype=np.float64).reshape(plain["shape"])
 
 
+def _listed(value: Value) -> Plain:
+    return value.tolist()
+
+
 def _unchanged(value: Value) -> Value:
     return value
 
@@ -163,7 +185,7 @@ SIMPLE: dict[Any, Form] = {
     Transform: Form(pa.list_(pa.float64()), lambda transform: transform.matrix.ravel(),
                     lambda plain: Transform(np.reshape(plain, (4, 4)))),
     Image: Form(pa.string(), pixel_hash, _unchanged),
-    Any: Form(pa.string(), lambda value: canonical(value).decode(), json.loads),
+    Any: Form(pa.string(), lambda value: json.dumps(value, default=_listed), json.loads),
 }
 
 COMPOSED: dict[Any, Callable[[tuple[Any, ...]], Form]] = {

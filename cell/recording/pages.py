@@ -17,7 +17,7 @@ from cell.core.errors import DocumentError
 from cell.core.observation import Image
 from cell.recording import layout
 from cell.recording.chain import NOTHING, link, text_hash
-from cell.recording.echo import outcomes_of, resolve_to_holes
+from cell.recording.echo import complete_hole, complete_stop, outcomes_of
 from cell.recording.forms import form_of, pixel_hash
 from cell.recording.rows import Row, damage_explained, read_rows
 
@@ -75,7 +75,7 @@ def _pages(path: Path) -> Iterator[Page]:
         if isinstance(page.record, HoleRecord):
             outcomes |= outcomes_of(page.record)
         elif isinstance(page.record, Stop):
-            page = replace(page, record=resolve_to_holes(page.record, outcomes))
+            page = replace(page, record=complete_stop(page.record, outcomes))
         if chain == NOTHING and (page.missing or not isinstance(page.record, Start)):
             raise DocumentError("holds no whole start record", source=str(path))
         yield page
@@ -128,7 +128,7 @@ def _read_hole(plain: dict[str, Any], parts: Iterable[Row]) -> Page:
     for view, name in zip(views, names, strict=True):
         view["image"] = images.get(name, PRUNED)
     missing = sum(name not in images for name in names)
-    return Page(form_of(HoleRecord).value(plain), "", faults, missing)
+    return Page(complete_hole(form_of(HoleRecord).value(plain)), "", faults, missing)
 
 
 def _read_stop(plain: dict[str, Any], parts: Iterable[Row]) -> Page:

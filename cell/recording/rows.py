@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rerun.chunk import LazyChunkStream, RrdReader
 
 from cell.core.errors import DocumentError
-from cell.recording.forms import Plain
+from cell.recording.forms import Plain, plain_of
 from cell.recording.framing import copy_whole, read_frame
 from cell.recording.layout import is_audited
 
@@ -34,7 +34,7 @@ class Row:
     def first(self, name: str) -> Plain:
         """Return the first value of a component, as plain values; None where it is absent."""
         values = self.columns[name].values if name in self.columns else None
-        return values[0].as_py() if values is not None and len(values) else None
+        return plain_of(values[0]) if values is not None and len(values) else None
 
     def blob(self, name: str) -> NDArray[np.uint8] | None:
         """Return a component's bytes as a uint8 array that lies where they were read."""

@@ -17,7 +17,7 @@ from cell.core.documents.result import Measured, Outcome
 from cell.core.errors import DocumentError
 from cell.recording import layout
 from cell.recording.chain import NOTHING, link, text_hash
-from cell.recording.echo import outcomes_of, refer_to_holes
+from cell.recording.echo import outcomes_of, say_hole_once, say_stop_once
 from cell.recording.forms import Plain, form_of
 from cell.recording.keys import key_path, read_key
 from cell.recording.picture import Picture
@@ -133,7 +133,7 @@ class Recorder:
 
     def _write_hole(self, record: HoleRecord) -> None:
         self._stream.at(layout.HOLE_TIMELINE, self._holes)
-        plain = self._write_record(layout.HOLE, record)
+        plain = self._write_record(layout.HOLE, say_hole_once(record))
         hashes = [view["image"] for view in plain["observation"]["views"]]
         for index in _shown_last(record):
             view = record.observation.views[index]
@@ -145,7 +145,7 @@ class Recorder:
         self._holes += 1
 
     def _write_stop(self, stop: Stop) -> None:
-        self._write_record(layout.STOP, refer_to_holes(stop, self._outcomes))
+        self._write_record(layout.STOP, say_stop_once(stop, self._outcomes))
         self._picture.finish(stop)
 
     def _write_record(self, place: layout.Place, record: object) -> Plain:

@@ -34,9 +34,10 @@ class Papers:
 
     def measured(self, index: int) -> Measured:
         draw = self.rng.normal
+        located, two_step = self._located("joint", draw(size=3)), self._located("two-step", None)
+        two_step.trace["rim"] = located.trace["rim"].copy()  # the two share their points
         return Measured(f"H{index}", draw(size=3), 5.0 + draw(), draw(size=(4, 4)), None,
-                        self._located("joint", draw(size=3)), self._located("two-step", None), 1,
-                        {"robot": (0.0, -0.0, 5e-324, 1 / 3)})
+                        located, two_step, 1, {"robot": (0.0, -0.0, 5e-324, 1 / 3)})
 
     def stop(self, holes: int) -> Stop:
         feature = Feature("H0", "in_tolerance", self.measured(0), {"x": 1.0}, {"x": 0.1},
