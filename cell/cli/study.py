@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from cell.cli.study_offsets import study_offsets
 from cell.cli.words import answers, print_json
 from cell.core.errors import IN_TOLERANCE, OUT_OF_TOLERANCE
 
@@ -24,7 +25,10 @@ study_app = typer.Typer(
 FILE: CSV with a column `id`, some of `x,y,z,d` in mm, and where known `approach` (the robot
 left and came back), `location` (the body was taken out and put back) and `part`.
 Ends with 0 where every
-index was reached, 1 where one was missed or refused, 2 where a table cannot be read.""")
+index was reached, 1 where one was missed or refused, 2 where a table cannot be read.
+
+`offsets` is another thing: it learns the correlation to a CMM from recordings.""")
+study_app.command("offsets")(study_offsets)
 
 FILES = typer.Argument(..., metavar="FILE…", help="Tables of measured values.")
 CONFIDENCE = typer.Option(0.95, min=0.5, max=0.9999, help="Two-sided confidence of the bounds.")

@@ -2,7 +2,7 @@
 
 - temperature: lengths scaled to 20 degrees C (ISO 1);
 - alignment: as the fixture holds the body, by 3-2-1 / RPS, or by best fit (`align`);
-- offset: CMM correlation, CMM minus sensor, at the stop where it was learnt;
+- offset: CMM correlation, CMM minus sensor, at the stop where it was learnt (`_corrected`);
 - deviation: measured minus nominal by controlled axis; true position is 2 · |deviation in the
   hole's plane|, the diameter of its zone (ISO 1101);
 - rule: simple, |deviation| ≤ tolerance; or guarded (ISO 14253-1) with g = z u, z the one-sided
@@ -37,6 +37,7 @@ from cell.metrology.align import Aligned, Placed, align_body
 
 REFERENCE_C = 20.0
 SAME_STOP_DEG = 2.0  # of every joint: an offset learnt at another stop does not hold
+CONSTANT_AT_A_STOP = ("intrinsics", "light_plane", "hand_eye", "robot", "registration")
 
 
 @dataclass(frozen=True)
@@ -60,11 +61,15 @@ class Circumstances:
 
 @dataclass(frozen=True, eq=False)
 class _Circle:
-    """A hole on its way to a verdict: centre (3,), diameter, covariance (4, 4) of both; mm."""
+    """A hole on its way to a verdict: centre (3,), diameter, covariance (4, 4) of both; mm.
+
+    `constant` (4,) are the variances in it that are the same error whenever this stop is measured.
+    """
 
     centre: Array
     diameter: float
     covariance: Array
+    constant: Array
 
     @property
     def values(self) -> dict[str, float]:
@@ -108,21 +113,29 @@ def judge_axis(deviation: float, tolerance: float, sigma: float, decision: Decis
 
 
 def _at_20_degrees(outcome: Measured, job: JobDocument, circumstances: Circumstances) -> _Circle:
-    covariance = _without_registration(outcome) if job.alignment.method != "fixture" \
-        else outcome.covariance
+    aligned = job.alignment.method != "fixture"
+    covariance = _without_registration(outcome) if aligned else outcome.covariance
+    constant = _variances(outcome, CONSTANT_AT_A_STOP[:-1] if aligned else CONSTANT_AT_A_STOP)
     if job.thermal is None:
-        return _Circle(outcome.centre, outcome.diameter, covariance)
+        return _Circle(outcome.centre, outcome.diameter, covariance, constant)
     measured = circumstances.part_temperature_c
     warmer = (job.thermal.part_temperature_c if measured is None else measured) - REFERENCE_C
     fixed = np.array(job.thermal.fixed_point)
     scale = 1.0 - job.thermal.expansion_per_kelvin * warmer
-    return _Circle(fixed + scale * (outcome.centre - fixed), scale * outcome.diameter, covariance)
+    return _Circle(fixed + scale * (outcome.centre - fixed), scale * outcome.diameter, covariance,
+                   constant)
 
 
 def _without_registration(outcome: Measured) -> Array:
     """Take the body registration out of the variances: aligning takes its error out of the body."""
-    share = np.square(outcome.budget.get("registration", (0.0, 0.0, 0.0, 0.0)))
+    share = _variances(outcome, ["registration"])
     return np.diag(np.maximum(np.diag(outcome.covariance) - share, 0.0))
+
+
+def _variances(outcome: Measured, sources: Sequence[str]) -> Array:
+    """Add up what sources contribute to the variances of x, y, z and the diameter (4,)."""
+    shares = [outcome.budget.get(source, (0.0, 0.0, 0.0, 0.0)) for source in sources]
+    return np.asarray(np.square(shares).sum(axis=0))
 
 
 def sort_offsets(papers: Papers, circumstances: Circumstances
@@ -177,16 +190,24 @@ def _not_judged(hole: Hole, outcome: Outcome | None, aligned: Aligned) -> Featur
 
 
 def _corrected(circle: _Circle, aligned: Aligned, offsets: Sequence[Offset]) -> _Circle:
-    """Align a circle and add its offsets, with what each adds to the uncertainty."""
-    shift, variance = np.zeros(4), np.zeros(4)
+    """Align a circle and add its offsets, with what each changes of the uncertainty.
+
+    What is the same error at every visit of a stop (sensor, hand-eye, the arm's kinematics, the
+    registration) is in the offset, and so no longer in the result. In its place come the
+    repeatability of one measurement, arm included, and the offset's own uncertainty. The picture's
+    own shares stay: some of its scatter counts twice, on the safe side. Drift since the offset was
+    learnt is in neither; the day it expires and the master check bound it.
+    """
+    values = np.array([*(aligned.aligned_from_body @ circle.centre), circle.diameter])
+    covariance = circle.covariance.copy()
+    covariance[:3, :3] = aligned.covariance(circle.centre, circle.covariance[:3, :3])
     for offset in offsets:
-        shift[AXES.index(offset.axis)] = offset.value_mm
-        variance[AXES.index(offset.axis)] = offset.spread_mm**2 / offset.sample_size
-    covariance = circle.covariance + np.diag(variance)
-    covariance[:3, :3] = np.diag(variance[:3]) + aligned.covariance(circle.centre,
-                                                                    circle.covariance[:3, :3])
-    return _Circle(aligned.aligned_from_body @ circle.centre + shift[:3],
-                   circle.diameter + shift[3], covariance)
+        axis = AXES.index(offset.axis)
+        own = max(covariance[axis, axis] - circle.constant[axis], 0.0)
+        values[axis] += offset.value_mm
+        covariance[axis, :] = covariance[:, axis] = 0.0
+        covariance[axis, axis] = own + offset.repeatability**2 + offset.variance
+    return _Circle(values[:3], float(values[3]), covariance, circle.constant)
 
 
 def _worst(verdicts: Iterable[Verdict]) -> Verdict:

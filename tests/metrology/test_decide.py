@@ -290,8 +290,37 @@ def test_a_cmm_offset_is_added_and_the_raw_value_kept(papers):
     assert feature.deviation["y"] == pytest.approx(0.0, abs=1e-9)
     assert feature.offset == {"y": 0.042}
     assert feature.outcome.centre[1] == hole.centre[1] - 0.042
-    assert feature.uncertainty["y"] == pytest.approx(np.hypot(SIGMA, 0.02 / 2))
+    assert feature.uncertainty["y"] == pytest.approx(np.sqrt(SIGMA**2 + 0.02**2 + 0.02**2 / 4))
     assert feature.uncertainty["x"] == pytest.approx(SIGMA)
+
+
+CHAIN = {"hand_eye": (0.06, 0.05, 0.04, 0.0), "robot": (0.1, 0.12, 0.11, 0.0),
+         "registration": (0.05, 0.07, 0.06, 0.0), "intrinsics": (0.01, 0.02, 0.01, 0.004)}
+
+
+def through_the_chain(hole):
+    """A hole with the uncertainty of the whole way to the body, all of its axes linked."""
+    shares = np.array(list(CHAIN.values()))
+    covariance = np.eye(4) * SIGMA**2 + shares.T @ shares
+    return dataclasses.replace(measured(hole, hole.centre), covariance=covariance, budget=CHAIN)
+
+
+@pytest.mark.parametrize("alignment", [Alignment(), BEST_FIT])
+def test_an_offset_takes_the_place_of_what_is_constant_at_its_stop(papers, alignment):
+    known = OFFSET.model_copy(update={"repeatability_mm": 0.03, "cmm_u_mm": 0.01})
+    papers = with_job(with_offset(papers, known), alignment=alignment)
+    outcomes = [through_the_chain(papers.hole(o.hole_id)) for o in body(papers)]
+    feature = by_id(judge_body(papers, outcomes, TODAY))["BP1"]
+    plain = by_id(judge_body(papers, outcomes, Circumstances()))["BP1"]
+    left = np.sqrt(SIGMA**2 + 0.03**2 + 0.03**2 / 4 + 0.01**2)
+    added = plain.uncertainty["y"]**2 - SIGMA**2 - np.sum(
+        [share[1]**2 for name, share in CHAIN.items()
+         if name != "registration" or alignment.method == "fixture"])
+    assert feature.uncertainty["y"] == pytest.approx(np.sqrt(left**2 + added), rel=1e-3)
+    assert added == pytest.approx(0.0, abs=1e-9) or alignment is BEST_FIT
+    assert plain.uncertainty["y"] > 2.0 * left
+    for axis in "xzd":
+        assert feature.uncertainty[axis] == plain.uncertainty[axis]
 
 
 @pytest.mark.parametrize(("circumstances", "reason"), [

@@ -15,10 +15,12 @@ Date = Annotated[str, Field(pattern=r"^\d{4}-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01
 
 
 class Offset(Document):
-    """One correlation offset: CMM minus sensor, the mean over `sample_size` bodies.
+    """One correlation offset: CMM minus sensor, the mean over `sample_size` runs or bodies.
 
     It holds at the stop where it was learnt, `joints_deg`, and until the end of the day `expires`.
-    `spread_mm` is the standard deviation of the paired differences.
+    `spread_mm` is the standard deviation of the paired differences, `repeatability_mm` that of one
+    measurement at that stop if it is known better than by these few (else the spread stands for
+    it), `cmm_u_mm` the standard uncertainty of the CMM.
     """
 
     hole: str
@@ -30,6 +32,18 @@ class Offset(Document):
     learnt: Date
     expires: Date
     by: str = ""
+    repeatability_mm: NotNegative | None = None
+    cmm_u_mm: NotNegative = 0.0
+
+    @property
+    def repeatability(self) -> float:
+        """Standard deviation of one measurement at the stop, mm."""
+        return self.spread_mm if self.repeatability_mm is None else self.repeatability_mm
+
+    @property
+    def variance(self) -> float:
+        """The square of the offset's standard uncertainty, mm²: of its mean, and of the CMM."""
+        return self.repeatability**2 / self.sample_size + self.cmm_u_mm**2
 
 
 class OffsetsDocument(Document):
