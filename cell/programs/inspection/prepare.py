@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from cell.archive.papers import read_papers
+from cell.archive.papers import PapersFound, read_papers
 from cell.core.documents.papers import Papers, check_identity
 from cell.core.kinematics import Arm, arm_for
 from cell.core.ports import RobotIdentity
@@ -36,7 +36,11 @@ def prepare(job: Path, cell: str | None = None) -> Prepared:
     Raises:
         DocumentError: a document is wrong, or a stop cannot be reached safely.
     """
-    found = read_papers(job, cell)
+    return prepare_papers(read_papers(job, cell))
+
+
+def prepare_papers(found: PapersFound) -> Prepared:
+    """Parse the papers of a job and plan its stops; errors as in `prepare`."""
     papers = found.parse()
     arm = arm_for(papers.station.robot.model)
     stops = plan_stops(papers.job, papers.holes, papers.calibration, papers.station, arm)
