@@ -49,6 +49,7 @@ def _draw_side(axes: Axes, features: Sequence[Feature], holes: dict[str, Hole],
             axes.annotate(feature.id, place, xytext=(4, 4), textcoords="offset points", fontsize=8)
     axes.set_xlabel(f"{side[0]} (mm)", fontsize=8)
     axes.set_ylabel(f"{side[1]} (mm)", fontsize=8)
+    axes.margins(0.12)
     axes.tick_params(labelsize=7)
     axes.set_aspect("equal", adjustable="datalim")
     axes.grid(visible=True, color="#e6e8eb", linewidth=0.6)
