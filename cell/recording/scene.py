@@ -20,6 +20,7 @@ from cell.recording.body_scene import (
     draw_verdict,
 )
 from cell.recording.hole_scene import Drawing, draw_camera, draw_hole, draw_summary
+from cell.recording.memory import send_blueprint
 from cell.recording.pages import without_images
 
 
@@ -38,7 +39,7 @@ class Scene:
         self._draw(draw_camera(self._papers.calibration), static=True)
         self._draw(draw_nominals(self._papers.planned_holes), static=True)
         self._draw_limits(0)
-        stream.send_blueprint(build_blueprint(self._papers, following))
+        send_blueprint(stream, build_blueprint(self._papers, following))
 
     def add(self, at: int, record: HoleRecord) -> None:
         """Draw the `at`-th hole. Where the alignment needs other holes first, its judgement comes

@@ -9,12 +9,12 @@ from pathlib import Path
 import cv2
 import pyarrow as pa
 import rerun as rr
-from rerun_bindings import flush_and_cleanup_orphaned_recordings as forget_closed_streams
 
 from cell.core.errors import RecordingError
 from cell.core.observation import Image
 from cell.recording import layout
 from cell.recording.disk import Disk
+from cell.recording.memory import sweep_streams
 
 PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1,
        cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_HUFFMAN_ONLY]
@@ -33,7 +33,7 @@ class Stream:
             OSError: it exists, or cannot be created.
         """
         rr.set_strict_mode(True)
-        forget_closed_streams()  # or else each takes one or two megabytes to the end
+        sweep_streams()
         self.path, self._disk = path, Disk(path)
         self.rerun = rr.RecordingStream(layout.APPLICATION, recording_id=recording_id)
         self.rerun.set_sinks(rr.FileSink(self._disk.entrance))
