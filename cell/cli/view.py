@@ -8,13 +8,16 @@ from pathlib import Path
 import typer
 
 from cell.cli.words import console
+from cell.core.errors import DocumentError
 
 
 def view(
-    log: Path = typer.Argument(..., metavar="LOG", help="A recording (.rrd)."),
+    log: Path | None = typer.Argument(None, metavar="LOG", help="A recording (.rrd)."),
     hole: str | None = typer.Option(None, metavar="ID", help="Open it at this hole."),
     web: bool = typer.Option(False, help="Serve it to a browser on this machine instead of opening "
                                          "a window."),
+    live: bool = typer.Option(False, help="Instead of a recording, show what `cell run --live` "
+                                          "measures on this machine."),
     picture: Path | None = typer.Option(None, metavar="PNG", help="Save a picture of it and end; "
                                                                   "needs no screen."),
 ) -> None:
@@ -29,8 +32,12 @@ def view(
     Exit code: 0 closed, 2 unreadable or no such hole, 3 no viewer or no screen.
     """
     from cell.recording.guard import guarded
-    from cell.recording.replay import find_hole, photograph, serve, show
+    from cell.recording.replay import find_hole, photograph, serve, show, wait_for_run
 
+    if live:
+        return wait_for_run(_tell if web else None)
+    if log is None:
+        raise DocumentError("expected a recording, or --live", place="LOG")
     number = guarded(partial(find_hole, hole_id=hole), log)
     if picture is not None:
         picture.write_bytes(photograph(log, number).png)
@@ -38,6 +45,7 @@ def view(
         serve(log, _tell)
     else:
         show(log, number)
+    return None
 
 
 def _tell(address: str) -> None:

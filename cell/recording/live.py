@@ -18,14 +18,13 @@ from types import TracebackType
 from typing import TypeAlias
 
 from cell.core.documents.record import HoleRecord, Start, Stop
-from cell.recording.viewer import dying_with_parent
+from cell.recording.viewer import LIVE_PORT, dying_with_parent
 
 log = logging.getLogger(__name__)
 
 Message: TypeAlias = tuple[int, Start | HoleRecord | Stop]
 """A paper, and its place on the time line."""
 
-PORT = 9876
 WAITING = 3
 """Papers that may wait for the viewer before the oldest is dropped."""
 
@@ -33,9 +32,9 @@ FAREWELL_S = 3.0
 
 
 class LiveView:
-    """Shows a run in a viewer on this machine: `cell view --live`, or any that listens there."""
+    """Shows a run in a viewer on this machine: `cell view --live`."""
 
-    def __init__(self, port: int = PORT) -> None:
+    def __init__(self, port: int = LIVE_PORT) -> None:
         """Aim at a viewer on a port of the loopback interface; it need not be there."""
         self._waiting: deque[Message] = deque(maxlen=WAITING)
         self._something, self._closing, self._holes = Event(), False, 0

@@ -17,7 +17,14 @@ from cell.recording import layout
 from cell.recording.blueprint import build_blueprint
 from cell.recording.pages import read_pages
 from cell.recording.rows import open_chunks, read_rows
-from cell.recording.viewer import free_port, has_display, hub_url, viewer_process, web_url
+from cell.recording.viewer import (
+    LIVE_PORT,
+    free_port,
+    has_display,
+    hub_url,
+    viewer_process,
+    web_url,
+)
 
 PATIENCE_S = 60.0
 SETTLE_S = 3.0  # until a software renderer has drawn what it was told
@@ -78,8 +85,7 @@ def show(log: Path, number: int) -> None:
         DocumentError: the recording is unreadable.
         DeviceError: there is no screen, or the viewer does not start.
     """
-    if not has_display():
-        raise DeviceError("there is no screen here: use --web or --picture", device="viewer")
+    _check_display()
     port = free_port()
     with viewer_process("--port", str(port)) as process:
         viewer = _connect(port)
@@ -103,6 +109,24 @@ def serve(log: Path, tell: Callable[[str], None]) -> None:
         process.wait()
 
 
+def wait_for_run(tell: Callable[[str], None] | None) -> None:
+    """Open a window, or serve a page whose address `tell` gets, for what is measured live.
+
+    Raises:
+        DeviceError: there is no screen, or the port is taken.
+    """
+    web_port = free_port()
+    web = ("--serve-web", "--web-viewer-port", str(web_port)) if tell is not None else ()
+    if tell is None:
+        _check_display()
+    with viewer_process("--port", str(LIVE_PORT), *web) as process:
+        if tell is not None:
+            tell(web_url(web_port, LIVE_PORT))
+        if process.wait():
+            raise DeviceError(f"ended at once: is the port {LIVE_PORT} of another viewer?",
+                              device="viewer")
+
+
 def photograph(log: Path, number: int) -> Photograph:
     """Take a picture of the viewer at the `number`-th hole, without a screen.
 
@@ -118,6 +142,11 @@ def photograph(log: Path, number: int) -> Photograph:
         time.sleep(SETTLE_S)
         reports = [report for view in viewer.get_state().views for report in view.reports]
         return Photograph(viewer.take_screenshot(), tuple(map(str, reports)))
+
+
+def _check_display() -> None:
+    if not has_display():
+        raise DeviceError("there is no screen here: use --web or --picture", device="viewer")
 
 
 def _connect(port: int) -> ViewerClient:

@@ -21,6 +21,7 @@ import rerun_cli  # type: ignore[import-untyped]
 
 LOOPBACK = "127.0.0.1"
 BINARY = Path(rerun_cli.__file__).parent / "rerun"  # the command of that name leaves it orphaned
+LIVE_PORT = 9876  # where runs are shown live
 ON_PARENTS_DEATH = 1  # PR_SET_PDEATHSIG
 
 
