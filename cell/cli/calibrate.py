@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 from rich.table import Table
 
+from cell.cli.calibrate_cell import SPEED, YES, body, check
 from cell.cli.calibrate_operator import TerminalOperator
 from cell.cli.calibrate_sets import CELL, FOLDER, JSON, activate, diff, history, rollback
 from cell.cli.words import answers, console, print_json
@@ -29,10 +30,7 @@ calibrate = typer.Typer(
 
 PLAN = typer.Option(None, "--plan", metavar="FILE", help="How to run the session: views, goal, "
                                                          "gates, reason; every key has a default.")
-YES = typer.Option(False, "--yes", help="Ask nobody: everything that was planned is agreed to.")
 RESUME = typer.Option(False, "--resume", help="Go on with the newest session of the cell.")
-SPEED = typer.Option(1.0, "--speed", min=0.01, help="Run a simulated cell this many times faster "
-                                                    "than real time.")
 
 
 @dataclass(frozen=True)
@@ -62,6 +60,8 @@ class Mount(StrEnum):
     static = "static"
 
 
+calibrate.command()(body)
+calibrate.command()(check)
 calibrate.command()(history)
 calibrate.command()(diff)
 calibrate.command()(activate)

@@ -15,7 +15,7 @@ from cell.core.documents.calibration_session import SessionHeader, ViewRecord
 from cell.core.errors import DocumentError
 from cell.core.observation import Image
 
-HEADER, VIEWS, IMAGES = "session.json", "views.jsonl", "images"
+HEADER, VIEWS, IMAGES, OUTCOME = "session.json", "views.jsonl", "images", "outcome.txt"
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,15 +98,22 @@ class Session:
         return read_image(self.folder / name, image_size)
 
 
-def latest_session(folder: Path) -> Path:
-    """Find the newest session of a cell.
+    def conclude(self, outcome: str) -> None:
+        """Close the session: it cannot be gone on with."""
+        replace_text(self.folder / OUTCOME, outcome + "\n")
+
+
+def latest_session(folder: Path, what: str) -> Path:
+    """Find the newest session of a cell that was begun for `what` and not concluded.
 
     Raises:
         DocumentError: there is none.
     """
-    sessions = sorted(path.parent for path in (folder / "sessions").glob(f"*/{HEADER}"))
+    sessions = sorted(path.parent for path in (folder / "sessions").glob(f"*-{what}/{HEADER}")
+                      if not (path.parent / OUTCOME).exists())
     if not sessions:
-        raise DocumentError("there is no session to go on with", source=str(folder / "sessions"))
+        raise DocumentError(f"there is no open session of `{what}` to go on with",
+                            source=str(folder / "sessions"))
     return sessions[-1]
 
 

@@ -68,7 +68,7 @@ def run_wizard(request: Request, operator: Operator) -> Finished:
     """
     belief = read_belief(request.calibration, request.cell)
     with open_station(belief.station, belief.folder, request.speed) as station:
-        session = (_resume(belief, station, operator) if request.resume
+        session = (_resume(request.what, belief, station, operator) if request.resume
                    else _begin(request, belief, station, operator))
         Gathering(session, belief, station, operator).gather()
         drive(station, _way_home(belief, station, session))
@@ -81,6 +81,7 @@ def conclude(session: Session, belief: Belief, operator: Operator) -> Finished:
     solution = solve_session(session, belief)
     show(solution, operator)
     reason = _accepted(solution, session.header.plan, operator)
+    session.conclude(f"{solution.verdict}{'' if reason is None else ', accepted'}")
     if reason is None or session.header.what == "camera":
         return Finished(session.folder, solution, None, active=False)
     signature = Signature(session.header.plan.operator, _now("%Y-%m-%dT%H%MZ"), reason)
@@ -129,8 +130,8 @@ def _begin(request: Request, belief: Belief, station: Station, operator: Operato
     return Session.begin(belief.folder / "sessions" / name, header)
 
 
-def _resume(belief: Belief, station: Station, operator: Operator) -> Session:
-    session = Session.read(latest_session(belief.folder))
+def _resume(what: What, belief: Belief, station: Station, operator: Operator) -> Session:
+    session = Session.read(latest_session(belief.folder, what))
     header = session.header
     if (header.base_set, header.robot.serial) != (belief.set_id, station.identity.serial):
         raise DocumentError("robot or active set have changed since this session began: begin "

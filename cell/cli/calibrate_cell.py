@@ -1,0 +1,84 @@
+"""`cell calibrate body` and `check`: where the body lies, and whether anything has wandered."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import typer
+
+from cell.cli.calibrate_operator import TerminalOperator
+from cell.cli.calibrate_sets import CELL, FOLDER, JSON, REASON
+from cell.cli.words import answers, console, print_json
+
+if TYPE_CHECKING:
+    from cell.core.ports import Operator
+
+ACCEPTED, REFUSED = 0, 1
+YES = typer.Option(False, "--yes", help="Ask nobody: everything that was planned is agreed to.")
+SPEED = typer.Option(1.0, "--speed", min=0.01, help="Run a simulated cell this many times faster "
+                                                    "than real time.")
+RPS = typer.Option(False, "--rps", help="Hold the body by the job's datums and their axes, as the "
+                                        "drawing means it; else by a best fit over all holes with "
+                                        "CMM values.")
+
+
+def body(job: Path = typer.Argument(..., help="The job whose master body is in the fixture."),
+         cell: str | None = typer.Option(None, help="The cell, if not the job's own."),
+         rps: bool = RPS, yes: bool = YES, reason: str = REASON, speed: float = SPEED,
+         as_json: bool = JSON) -> None:
+    """Register the body: measure the master body's holes and lay them onto their CMM values.
+
+    Writes calibration/<cell>/body/<job>.yaml with its uncertainty; the one before is kept.
+
+    Exit code: 0 accepted, 1 refused, 2 bad input, 3 device fault.
+    """
+    from cell.programs.calibration.body import BodyRequest, register_body
+
+    request = BodyRequest(job, cell, "rps" if rps else "best", speed=speed, reason=reason)
+    done = register_body(request, _operator(yes))
+    registration = done.registration
+    if as_json:
+        print_json({"verdict": done.verdict, "written": done.written and str(done.written),
+                    "base_from_body": registration.measured_from_body.matrix,
+                    "residuals_mm": registration.residuals, "left_out_mm": registration.left_out,
+                    "gates": [vars(gate) for gate in done.gates]})
+    raise typer.Exit(ACCEPTED if done.written else REFUSED)
+
+
+def check(cell: str = CELL, calibration: Path = FOLDER, yes: bool = YES, speed: float = SPEED,
+          as_json: bool = JSON) -> None:
+    """Look at the cell's boards again: have robot, sensor or fixture wandered since the set?
+
+    The first check of a set is its reference. The moving average warns at 0.05 mm, asks for a
+    correction at 0.10 and stops at 0.20; nothing is corrected by itself.
+
+    Exit code: 0 good or first, 1 act, stop or repeat, 2 bad input, 3 device fault.
+    """
+    from cell.programs.calibration.check import CheckRequest, check_cell
+
+    done = check_cell(CheckRequest(cell, calibration, speed=speed), _operator(yes))
+    alarm = "reference" if done.drift is None else done.drift.alarm
+    if as_json:
+        drift = done.drift
+        print_json({"alarm": alarm, "places": done.places,
+                    "shifts_mm": None if drift is None else dict(drift.shifts),
+                    "average_mm": None if drift is None else drift.average,
+                    "left_over_mm": None if drift is None else drift.left_over,
+                    "correctable": None if drift is None else drift.correctable,
+                    "joint_temperatures_c": list(done.temperatures)})
+    elif done.drift is None:
+        answers.print("the first check of this set: it is the reference from now on")
+    else:
+        size = float(np.linalg.norm(done.drift.average))
+        answers.print(f"{alarm}: moving average {size:.3f} mm, left over after the rigid part "
+                      f"{done.drift.left_over:.3f} mm", highlight=False)
+    raise typer.Exit(ACCEPTED if alarm in ("reference", "ok", "warn") else REFUSED)
+
+
+def _operator(yes: bool) -> Operator:
+    from cell.programs.calibration.operators import Unattended
+
+    terminal = TerminalOperator(console)
+    return Unattended(terminal.tell) if yes else terminal

@@ -1,0 +1,134 @@
+"""The check between calibrations: the fixed boards again, against where this set saw them first."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cell.archive.files import read_text
+from cell.core.documents.calibration_session import CalibrationPlan
+from cell.core.documents.papers import check_identity
+from cell.core.documents.targets import BoardDocument
+from cell.core.errors import DocumentError, UnmeasurableError
+from cell.core.geometry import Array
+from cell.core.ports import Operator
+from cell.metrology.board_pose import locate_boards
+from cell.metrology.calibration_gates import Level
+from cell.metrology.detect_board import detect_board
+from cell.metrology.drift import Drift, judge_drift
+from cell.programs.calibration.belief import Belief, design_of, read_belief
+from cell.programs.calibration.capture import drive, shoot
+from cell.programs.calibration.poses import free_path, plan_poses, plan_start
+from cell.programs.calibration.recorded import read_gates
+from cell.programs.station import Station, open_station
+
+LOG = "drift/log.jsonl"
+VIEWS = CalibrationPlan(views=6, hold_out=0, lean_deg=20.0)
+
+
+@dataclass(frozen=True)
+class CheckRequest:
+    """What `cell calibrate check` was asked for."""
+
+    cell: str
+    calibration: Path = Path("calibration")
+    gates: Level = "fine"
+    speed: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedCell:
+    """What came of it; `drift` is None where this was the first check of its set."""
+
+    drift: Drift | None
+    places: dict[str, Array]
+    temperatures: tuple[float, ...]
+
+
+def check_cell(request: CheckRequest, operator: Operator) -> CheckedCell:
+    """Look at every board of the cell, and judge how far it has wandered since the set was made.
+
+    The first check of a set becomes its reference. Every check is one line of `drift/log.jsonl`,
+    with the joints' temperatures.
+
+    Raises:
+        DocumentError: a paper is wrong, no board was seen, or the operator said no.
+        DeviceError: a device failed.
+    """
+    belief = read_belief(request.calibration, request.cell)
+    if not operator.confirm("The arm will look at the boards. Is the way clear?"):
+        raise DocumentError("stopped by the operator")
+    with open_station(belief.station, belief.folder, request.speed) as station:
+        check_identity(belief.hand_eye.robot, station.identity, f"set {belief.set_id}")
+        places: dict[str, Array] = {}
+        for board in belief.targets.boards:
+            places |= _place(board, belief, station, operator)
+        temperatures = station.robot.state().temperatures
+    past = _past(belief)
+    drift = _judge(places, past, request.gates) if past else None
+    _log(belief, places, drift, temperatures)
+    return CheckedCell(drift, places, temperatures)
+
+
+def _place(board: BoardDocument, belief: Belief, station: Station,
+           operator: Operator) -> dict[str, Array]:
+    """Measure three corners of a board in the base: the mean over some views."""
+    design = design_of(board)
+    start = plan_start(belief, design, board.rough_place)
+    planned = plan_poses(belief, VIEWS, design, board.rough_place, start)
+    seen = []
+    for joints in (start, *(joints for _, joints in planned.targets), start):
+        drive(station, free_path(belief, station.robot.state().joints, joints, start))
+        ring = shoot(station).ring
+        try:
+            view = detect_board(ring.image, design).view
+        except UnmeasurableError as error:
+            operator.tell(f"{board.id}: {error.detail}")
+            continue
+        pose = locate_boards([view], belief.sensor.camera)[0].camera_from_board
+        seen.append(ring.base_from_flange_before @ belief.flange_from_camera @ pose
+                    @ design.outline)
+    if not seen:
+        raise DocumentError(f"the board {board.id} was not seen", source=belief.station.name)
+    corners = np.mean(seen, axis=0)
+    return {f"{board.id} corner {index}": corners[index] for index in range(len(corners))}
+
+
+def _judge(places: dict[str, Array], past: list[dict[str, Any]], gates: Level) -> Drift:
+    reference = {name: np.array(place) for name, place in past[0]["places"].items()}
+    averages = [np.array(line["average"]) for line in past if line["average"] is not None]
+    limits = read_gates().level(gates).drift_mm
+    return judge_drift(reference, places, averages, {str(k): v for k, v in limits.items()})
+
+
+def _past(belief: Belief) -> list[dict[str, Any]]:
+    """The checks of the active set, oldest first; a last line that was cut short does not count."""
+    file = belief.folder / LOG
+    lines = read_text(file).splitlines() if file.exists() else []
+    whole = [json.loads(line) for line in lines if line.startswith("{") and line.endswith("}")]
+    return [line for line in whole if line["set"] == belief.set_id]
+
+
+def _log(belief: Belief, places: dict[str, Array], drift: Drift | None,
+         temperatures: tuple[float, ...]) -> None:
+    file = belief.folder / LOG
+    line = {"at": datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"), "set": belief.set_id,
+            "places": {name: place.tolist() for name, place in places.items()},
+            "average": None if drift is None else drift.average.tolist(),
+            "alarm": "reference" if drift is None else drift.alarm,
+            "left_over_mm": None if drift is None else drift.left_over,
+            "joint_temperatures_c": list(temperatures)}
+    try:
+        file.parent.mkdir(exist_ok=True)
+        with file.open("a", encoding="utf-8") as stream:
+            stream.write(json.dumps(line) + "\n")
+            stream.flush()
+            os.fsync(stream.fileno())
+    except OSError as error:
+        raise DocumentError(f"cannot be written: {error.strerror}", source=str(file)) from None
