@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     Outcome: TypeAlias = Located | UnmeasurableError
 
 LOCATED, REFUSED = 0, 1
+LEAST_FACING = 0.5  # cosine of the tilt
 
 
 class Method(StrEnum):
@@ -90,6 +91,9 @@ def _expect(radius: float | None, normal: tuple[float, float, float] | None,
             raise DocumentError("expected a direction; came " + " ".join(map(str, normal)),
                                 source="--normal")
         direction = direction / length
+        if abs(direction[2]) < LEAST_FACING:
+            raise DocumentError("expected the normal of a sheet that the camera sees; came "
+                                + " ".join(map(str, normal)), source="--normal")
     return Expected(normal=direction, normal_sigma=math.radians(normal_sigma_deg), radius=radius,
                     thickness=thickness)
 

@@ -29,6 +29,7 @@ from cell.metrology.uncertainty import FORM_SIGMA, joint_budget, one_sided, shar
 RADIUS_SIGMA = 0.1  # mm: weak on a whole rim, decisive on an arc
 UNKNOWN_RADIUS_SIGMA = 100.0  # mm
 UNKNOWN_NORMAL_SIGMA = 0.1  # rad: a sensor is held square to the sheet, to some six degrees
+WIDEST_NORMAL_SIGMA = 0.3  # rad: a sheet seen edge-on shows no hole
 SQUARE = np.array([0.0, 0.0, -1.0])
 MOST_OFF_RADIUS = 0.2  # of the nominal: what lies beyond is another hole
 MOST_OFF_NORMAL = 5.0  # standard deviations of the plan's normal, and at least
@@ -65,7 +66,9 @@ def solve_circle(rim: Rim, stripes: Sequence[Shot], sensor: SensorModel,
 
 def normal_sigma(expected: Expected) -> float:
     """Say how well the normal is known beforehand, rad per tangent axis."""
-    return UNKNOWN_NORMAL_SIGMA if expected.normal is None else expected.normal_sigma
+    if expected.normal is None:
+        return UNKNOWN_NORMAL_SIGMA
+    return min(expected.normal_sigma, WIDEST_NORMAL_SIGMA)
 
 
 def _start(rim: Sight, stripes: Sequence[StripeSight], expected: Expected) -> Circle:

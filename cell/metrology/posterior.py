@@ -56,9 +56,8 @@ def solve_all(problem: Problem, start: Circle) -> Posterior:
         start = solution.circle  # the next one is not far
         solutions.append(solution)
         logarithms.append(logarithm + solution.log_evidence)
-    weights = np.exp(np.array(logarithms) - max(logarithms))
-    weights /= weights.sum()
-    kept = np.flatnonzero(weights > NEGLIGIBLE)
+    weights = np.exp(np.array(logarithms) - np.nanmax(logarithms))
+    kept = np.flatnonzero(weights > NEGLIGIBLE)  # and a number: a start far off may lead nowhere
     return Posterior(tuple(solutions[i] for i in kept), weights[kept] / weights[kept].sum())
 
 

@@ -17,6 +17,9 @@ Pixels = Annotated[int, Field(ge=16, le=20_000)]
 Covariance: TypeAlias = tuple[tuple[Number, ...], ...]
 
 
+SLANT = (float(np.sin(np.radians(1.0))), float(np.sin(np.radians(80.0))))  # of alpha
+
+
 class SensorDocument(Document):
     """`sensor.yaml`: the camera and the light plane, in the camera frame, mm and px.
 
@@ -44,10 +47,13 @@ class SensorDocument(Document):
     @field_validator("light_plane")
     @classmethod
     def _is_met_by_the_optic_axis(cls, plane: Vector4) -> Vector4:
-        _, _, c, d = plane
+        *_, c, d = plane
         if c == 0.0 or not -d / c > 0.0:
             raise ValueError("expected a, b, c, d of a plane that the optic axis meets in front "
                              "of the camera: -d / c above 0")
+        if not SLANT[0] < abs(c) / np.linalg.norm(plane[:3]) < SLANT[1]:
+            raise ValueError("expected a, b, c, d of a plane at a slant to the optic axis, "
+                             "between 1 and 80 degrees")
         return plane
 
     @field_validator("camera_covariance", "light_plane_covariance")
