@@ -127,8 +127,8 @@ def test_an_image_that_is_not_whole_is_bad_input(cell, words, workplace, how, sa
 
 @pytest.mark.parametrize("more", [
     ("--radius", "-1"), ("--radius", "nan"), ("--normal", "0", "0", "0"),
-    ("--normal", "nan", "0", "1"), ("--normal", "0", "1", "0"), ("--normal-sigma-deg", "0"), ("--thickness", "inf"),
-    ("--sensor", "none.yaml"), ("--sensor", "jobs/demo.yaml")])
+    ("--normal", "nan", "0", "1"), ("--normal", "0", "1", "0"), ("--normal-sigma-deg", "0"),
+    ("--thickness", "inf"), ("--sensor", "none.yaml"), ("--sensor", "jobs/demo.yaml")])
 def test_words_that_make_no_sense_are_bad_input(cell, words, more):
     code, out, _ = cell("locate", *words, *more, "--json")
     assert code == 2
