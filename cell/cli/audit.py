@@ -42,6 +42,8 @@ def audit(
                                                         "monday."),
     workers: int = typer.Option(1, min=1, metavar="N", help="Use N processes."),
     cluster: str = typer.Option(None, metavar="ADDRESS", help="Use a dask cluster (extra `dask`)."),
+    save: bool = typer.Option(False, help="Save a picture beside it, LOG.audit.rrd: both results "
+                                          "over the same images where they differ."),
     json_wanted: bool = typer.Option(False, "--json", help="Print one JSON object."),
 ) -> None:
     """Audit recordings: check that they are intact and compute every number again.
@@ -64,7 +66,7 @@ def audit(
     from cell.recording.keys import key_id, read_public_key
 
     question = Question(unsealed, tuple(key_id(read_public_key(path)) for path in key),
-                        read_what_if(calibration, job, method))
+                        read_what_if(calibration, job, method), save)
     found, folders = gather_logs(logs)
     if since is not None:
         found = started_since(found, parse_since(since, datetime.now().astimezone()))

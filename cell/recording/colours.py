@@ -8,6 +8,7 @@ VERDICTS = {"in_tolerance": (46, 160, 67), "out_of_tolerance": (218, 54, 51),
 NOMINAL = (150, 150, 160)
 EDGE = (80, 220, 120)
 ELLIPSE = (255, 205, 60)
+ANEW = (240, 90, 240)
 STRIPE = (255, 110, 110)
 CHORD = (110, 190, 255)
 LIMIT = (200, 70, 70)

@@ -71,10 +71,10 @@ def _draw_trace(trace: Trace) -> Iterator[Drawing]:
     """
     a_b_q = np.vstack([trace.get("chord", NOTHING), np.atleast_2d(trace.get("q", NOTHING))])
     yield f"{RING}/rim", _points(trace.get("rim"), colours.EDGE, 1.5)
-    yield f"{RING}/lines", _lines({**trace, **_cross(trace)}, {
+    yield f"{RING}/lines", draw_lines(trace, {
         "ellipse": colours.ELLIPSE, "across": colours.ELLIPSE, "down": colours.ELLIPSE})
     yield f"{LASER}/stripe", _points(trace.get("stripe"), colours.STRIPE, 1.5)
-    yield f"{LASER}/lines", _lines(trace, {"ellipse": colours.ELLIPSE, "chord": colours.CHORD})
+    yield f"{LASER}/lines", draw_lines(trace, {"ellipse": colours.ELLIPSE, "chord": colours.CHORD})
     yield f"{LASER}/points", _points(a_b_q, colours.CHORD, 4.0, ["A", "B", "Q"])
 
 
@@ -94,9 +94,11 @@ def _cross(trace: Trace) -> dict[str, Array]:
             "down": np.array([[x, y - CROSS], [x, y + CROSS]])}
 
 
-def _lines(trace: Trace, tints: Mapping[str, Colour]) -> rr.LineStrips2D:
-    drawn = [name for name in tints if name in trace]
-    return rr.LineStrips2D([trace[name] for name in drawn], colors=[tints[n] for n in drawn],
+def draw_lines(trace: Trace, tints: Mapping[str, Colour]) -> rr.LineStrips2D:
+    """Draw the lines that `tints` names; `across` and `down` are a cross over the centre."""
+    strips = {**trace, **_cross(trace)}
+    drawn = [name for name in tints if name in strips]
+    return rr.LineStrips2D([strips[name] for name in drawn], colors=[tints[n] for n in drawn],
                            radii=rr.Radius.ui_points(1.0))
 
 

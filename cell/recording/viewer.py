@@ -64,7 +64,7 @@ def hub_url(port: int) -> str:
 def web_url(web_port: int, port: int) -> str:
     """Return the page for a browser on this machine."""
     return (f"http://{LOOPBACK}:{web_port}/?url=rerun%2Bhttp%3A%2F%2F{LOOPBACK}%3A{port}%2Fproxy"
-            "&hide_welcome_screen=1")
+            "&theme=dark&hide_welcome_screen=1")
 
 
 def has_display() -> bool:

@@ -9,10 +9,13 @@ import yaml
 from recorded_body import GOLDEN, measured_anew, record_body
 
 from cell.core.documents.result import Measured
+from cell.core.errors import RecordingError
+from cell.programs.audit.folder import audit_folder
 from cell.programs.audit.log import audit_log
 from cell.programs.audit.question import Question, WhatIf
 from cell.recording import read
 from cell.recording.prune import prune
+from cell.recording.rows import open_chunks
 from cell.recording.seal import seal_path
 
 UNSEALED = Question(unsealed=True)
@@ -176,6 +179,21 @@ def test_what_if_the_tolerances_were_tighter(log):
     turned = {change.feature: change.verdict_then for change in audit.changes if change.turns}
     assert turned["BP2"] == "out_of_tolerance"
     assert audit.exit_code() == 1
+
+
+def test_both_results_are_saved_over_the_same_image_where_they_differ(folder):
+    true = measured_anew()[1][0].outcome
+    log = record_body(folder / "shown.rrd", holes=with_outcome(0, diameter=true.diameter + 0.05))
+    before = log.read_bytes()
+    audit_log(log, Question(save=True))
+    with open_chunks(log.with_suffix(".audit.rrd")) as chunks:
+        rows = {chunk.entity_path: chunk.num_rows for chunk in chunks}
+    assert {rows[path] for path in ("/camera/ring", "/camera/ring/recorded", "/camera/ring/now",
+                                    "/comparison")} == {1}
+    assert log.read_bytes() == before
+    assert not [finding for finding in audit_folder(folder).findings if "audit" in finding.file]
+    with pytest.raises(RecordingError, match="cannot be written"):
+        audit_log(log, Question(save=True))
 
 
 def test_the_recording_of_the_first_format_still_audits():

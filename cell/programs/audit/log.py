@@ -18,6 +18,7 @@ from cell.metrology.measure import measure_hole
 from cell.programs.audit.compare import Comparison, Difference, compare
 from cell.programs.audit.question import Question
 from cell.programs.audit.report import Change, LogAudit
+from cell.recording.audit_picture import AuditPicture
 from cell.recording.forms import as_recorded
 from cell.recording.integrity import Check, check_chain, check_images, check_seal
 from cell.recording.pages import Page, read_pages, without_images
@@ -47,7 +48,7 @@ def audit_log(log: Path, question: Question = PLAIN, watch: Watch = unwatched) -
         return LogAudit(log, problem, checks=tuple(checks))
     try:
         pages = read_pages(log)
-        audit = _Audit(question, next(pages))
+        audit = _Audit(log, question, next(pages))
         for count, page in enumerate(pages):
             audit.take(page)
             watch(count)
@@ -67,8 +68,9 @@ def _refusal(checks: list[Check], seal: Seal | None, question: Question) -> str 
 class _Audit:
     """One recording on its way through: the papers first, then hole by hole."""
 
-    def __init__(self, question: Question, first: Page) -> None:
+    def __init__(self, log: Path, question: Question, first: Page) -> None:
         assert isinstance(first.record, Start)  # `read_pages` sees to it
+        self._picture = AuditPicture(log, first.record) if question.save else None
         self._start, self._what_if = first.record, question.what_if.asks
         self._papers = question.papers(first.record)
         self._page, self._faults, self._missing = first, list(first.faults), 0
@@ -93,6 +95,8 @@ class _Audit:
 
     def close(self, log: Path, seal: Seal | None, checks: list[Check]) -> LogAudit:
         """Judge the body again and say what came of it."""
+        if self._picture is not None:
+            self._picture.close()
         then = as_recorded(judge_run(self._papers, self._start, self._then))
         recorded = self._stop.result if self._stop is not None else None
         if recorded is not None and not self._what_if:
@@ -116,11 +120,14 @@ class _Audit:
             self._then.append(without_images(record))
             return
         again = record.attempts[-1:] if self._what_if else record.attempts
+        before = len(self._differences)
         then = tuple(replace(attempt, outcome=self._outcome(record, attempt)) for attempt in again)
         if not self._what_if:
             for number, (was, now) in enumerate(zip(record.attempts, then, strict=True)):
                 self._tally(compare(f"{record.observation.hole_id} attempt {number}", was, now))
         self._then.append(without_images(replace(record, attempts=then)))
+        if self._picture is not None and (self._what_if or len(self._differences) > before):
+            self._picture.add(record, then[-1].outcome)
 
     def _outcome(self, record: HoleRecord, attempt: Attempt) -> Outcome:
         """Measure a hole from the views of an attempt: the very function that ran live. A hole that

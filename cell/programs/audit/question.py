@@ -27,12 +27,14 @@ class Question:
     """How an audit goes about: picklable, so that it can travel to other processes.
 
     `unsealed` accepts a file without a fitting seal; `trusted` are the ids of keys one
-    of which must have signed; `what_if` asks for other numbers instead of the recorded ones.
+    of which must have signed; `what_if` asks for other numbers instead of the
+    recorded ones; `save` draws both results where they differ.
     """
 
     unsealed: bool = False
     trusted: tuple[str, ...] = ()
     what_if: WhatIf = WhatIf()
+    save: bool = False
 
     def papers(self, start: Start) -> Papers:
         """Parse the papers to recompute with: the recorded ones, with those of the what-if.
