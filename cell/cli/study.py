@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 study_app = typer.Typer(
     name="study", no_args_is_help=True,
-    help="""Study the measuring system from tables of measured values.
+    help="""Study the measuring system from what it has measured.
 
-FILE: CSV with a column `id`, some of `x,y,z,d` in mm, and where known `approach` (the robot
-left and came back), `location` (the body was taken out and put back) and `part`.
-Ends with 0 where every
-index was reached, 1 where one was missed or refused, 2 where a table cannot be read.
+FILE: recordings (.rrd), each of them a part by its body's number; or CSV with a column `id`, some
+of `x,y,z,d` in mm, and where known `approach` (the robot left and came back), `location` (the body
+was taken out and put back) and `part`.
 
-`offsets` is another thing: it learns the correlation to a CMM from recordings.""")
+Ends with 0 where every index was reached, 1 where one was missed or refused, 2 where a file cannot
+be read. `offsets` is another thing: it learns the correlation to a CMM from recordings.""")
 study_app.command("offsets")(study_offsets)
 
 FILES = typer.Argument(..., metavar="FILE…", help="Tables of measured values.")

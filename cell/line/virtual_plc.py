@@ -22,6 +22,9 @@ from cell.line.registers import (
     Bit,
 )
 
+PATIENCE = 3
+"""Masters in a row that may fail before the virtual line stops the shift."""
+
 LOOK = 0.02
 """Seconds between two looks at the cell."""
 
@@ -76,23 +79,32 @@ class VirtualPlc:
     def _run(self) -> None:
         try:
             self._client.connect()
-            for body in self._bodies:
-                if not self._bring(body):
-                    return
-            self._command("stop")
+            try:
+                self._bring_all()
+            finally:
+                if not self._stopping.is_set():
+                    self._command("stop")
         except (ModbusException, OSError, DeviceError) as failure:
             self.failure = None if self._stopping.is_set() else failure
         finally:
             self._client.close()
 
+    def _bring_all(self) -> None:
+        for body in self._bodies:
+            if not self._bring(body):
+                return
+
     def _bring(self, body: VirtualBody) -> bool:
         """Present one body, after the master where that is due; False where the line stops."""
+        masters = 0
         while not self._stopping.is_set():
             if not self._wait_for("ready", "master_due", "result_valid"):
                 return False
             if self._has("result_valid"):
                 self._acknowledge(VirtualBody("", 0))
             elif self._has("master_due") and self._master is not None:
+                if (masters := masters + 1) > PATIENCE:
+                    raise DeviceError(f"the master failed {PATIENCE} times", device="virtual PLC")
                 self._present(self._master)
             else:
                 self._present(body)

@@ -24,6 +24,7 @@ from cell.metrology.study import (
     solve_type1,
     solve_type3,
 )
+from cell.programs.results import read_rows
 
 LABELS = ("location", "approach", "part")
 Answer = TypeVar("Answer")
@@ -78,14 +79,16 @@ def study_type3(samples: Sequence[Sample], tolerance: float,
 
 
 def read_samples(files: Sequence[Path]) -> list[Sample]:
-    """Read tables with the columns `id`, some of `x,y,z,d`, and `location,approach,part` if known.
+    """Read tables with the columns `id`, some of `x,y,z,d`, and `location,approach,part` if known,
+    or recordings, of which each is a part.
 
     An empty number is a value that was not measured: it is left out, never taken as 0.
 
     Raises:
         DocumentError: a file cannot be read, a column is missing, or a cell is not a number.
     """
-    rows = [row for file in files for row in _rows(file)]
+    rows = [row for file in files
+            for row in (_recorded_rows if file.suffix == ".rrd" else _rows)(file)]
     features = dict.fromkeys(row["id"] for row in rows)
     samples = [_sample([row for row in rows if row["id"] == feature], feature, axis)
                for feature in features for axis in AXES]
@@ -124,6 +127,16 @@ def _rows(file: Path) -> Iterator[dict[str, str]]:
                        "where": f"line {number}", "file": str(file)}
     except (OSError, UnicodeDecodeError, csv.Error) as wrong:
         raise DocumentError(f"cannot be read: {wrong}", source=str(file)) from wrong
+
+
+def _recorded_rows(file: Path) -> Iterator[dict[str, str]]:
+    """Give what a recording measured, in the body frame as it was judged."""
+    rows = read_rows(file)
+    for feature in rows.features:
+        values = {row["axis"]: repr(row["measured"]) for row in rows.axes
+                  if row["feature"] == feature["feature"] and row["measured"] is not None}
+        yield {"id": feature["feature"], **values, "part": rows.body["body_id"],
+               "where": "hole", "file": str(file)}
 
 
 def _check_columns(file: Path, names: Sequence[str]) -> None:

@@ -75,3 +75,21 @@ def test_a_bad_table_is_refused_with_its_place(tmp_path, text, words):
         path.write_text(text)
     with pytest.raises(DocumentError, match=words):
         read_samples([path])
+
+
+def test_recordings_are_parts(tmp_path):
+    from made_cell import RecordedCell, demo_job, demo_papers
+
+    papers = demo_papers()
+    cell = RecordedCell({"demo": demo_job(papers)}, tmp_path, papers=papers,
+                        deviation=lambda body, hole: "blurred" if hole == 1 else 0.1 * body)
+    for body in ("A", "A", "B"):
+        inspection = cell.begin(cell.jobs["demo"], body, trial=True).inspection
+        inspection.measure_remaining(lambda hole: True)
+        inspection.finish("complete")
+    logs = sorted(tmp_path.glob("*.rrd"), key=lambda log: log.stat().st_mtime_ns)
+    samples = {(s.feature, s.axis): s for s in read_samples(logs)}
+    first, second = (hole for hole in papers.planned_holes[:2])
+    found = samples[first.id, "x"]
+    np.testing.assert_allclose(found.values, first.centre[0] + np.array([0.1, 0.2, 0.3]))
+    assert found.labels == {"part": ("A", "A", "B")} and (second.id, "x") not in samples

@@ -298,3 +298,38 @@ def test_a_type_may_not_be_named_twice():
     with pytest.raises(ValueError, match="named once"):
         ShiftDocument(name="x", cell="x", bodies=(BodyType(type=1, job="a"),),
                       master=MasterCheck(type=1, job="b"))
+
+
+class KilledError(BaseException):
+    """Stands for SIGKILL: nothing of the program runs after it."""
+
+
+@pytest.mark.parametrize(("moment", "state"), [(3, "measuring"), ("home", "judged")])
+def test_what_a_killed_shift_left_is_answered_first(made, moment, state):
+    made.cell.plant = once(KilledError(), body=1, hole=moment)
+    made.cell.make_safe = lambda: None
+    with pytest.raises(KilledError):
+        made.run(start("A"))
+    assert [v["state"] for v in made.visits] == [state]
+    told = len(made.line.results)
+    made.cell.plant = lambda body, hole: None
+    made.run(start("B"), STOP)
+    assert [r.body_id for r in made.line.results[told:]] == ["A", "B"]
+    assert made.line.results[told].sequence == 1
+    assert made.line.results[told].verdict == ("incomplete" if state == "measuring" else "ok")
+    assert [v["state"] for v in made.visits] == ["released", "released"]
+
+
+def test_a_ledger_that_fails_is_a_state_and_is_read_again(made):
+    from cell.results.database import DatabaseError
+    put, failures = made.ledger.database.transaction, [DatabaseError("disk is full", passing=True)]
+
+    def transaction():
+        if failures and made.line.statuses[-1].state == "measuring":
+            raise failures.pop()
+        return put()
+    made.ledger.database.transaction = transaction
+    made.run(start("A"), RESET, start("B"), STOP)
+    assert "results_lost" in made.states
+    assert [v["state"] for v in made.visits] == ["released", "released"]
+    assert made.verdicts == [("A", "incomplete"), ("B", "ok")]
