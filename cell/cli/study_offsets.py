@@ -44,7 +44,7 @@ def study_offsets(
 
     learnt = study_offsets(logs, expires, by)
     if out is not None:
-        write_offsets(learnt.study, out, replace=replace)
+        write_offsets(learnt.study, out, anew=replace)
     if as_json:
         print_json(_describe(learnt, out))
     else:

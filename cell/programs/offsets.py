@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,8 +21,9 @@ from cell.metrology.offsets_study import (
     judge_master_run,
     learn_offsets,
 )
-from cell.recording.integrity import check_seal
-from cell.recording.pages import read_pages, without_images
+from cell.recording.integrity import check_chain, check_seal
+from cell.recording.pages import Page, read_pages, without_images
+from cell.recording.seal import Seal
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +60,7 @@ def study_offsets(logs: Sequence[Path], days: int, by: str = "") -> LearntOffset
         by: who learns them.
 
     Raises:
-        DocumentError: too few recordings, one that is damaged, altered or incomplete, or that does
+        DocumentError: too few recordings, or one that is unsealed, altered or incomplete, or does
             not belong to the others.
     """
     if len(logs) < FEWEST_RUNS:
@@ -77,13 +78,13 @@ def study_offsets(logs: Sequence[Path], days: int, by: str = "") -> LearntOffset
     return LearntOffsets(recordings, study, expires)
 
 
-def write_offsets(study: OffsetsStudy, out: Path, *, replace: bool = False) -> None:
+def write_offsets(study: OffsetsStudy, out: Path, *, anew: bool = False) -> None:
     """Write the document of a study.
 
     Raises:
-        DocumentError: the file exists and is not to be replaced, or cannot be written.
+        DocumentError: the file exists and is not to be made `anew`, or cannot be written.
     """
-    if out.exists() and not replace:
+    if out.exists() and not anew:
         raise DocumentError("exists already: keep it elsewhere, or give --replace",
                             source=str(out), place="--out")
     try:
@@ -94,29 +95,37 @@ def write_offsets(study: OffsetsStudy, out: Path, *, replace: bool = False) -> N
 
 
 def _read(log: Path) -> Recorded:
-    """Read a recording without its images; it must be whole and as it was closed."""
-    seal, checks = check_seal(log)
-    start, records, stop = None, [], None
-    faults = [check.words for check in checks if check.passed is False]
-    chain = ""
-    for page in read_pages(log):
-        faults += page.faults
-        chain = page.chain
-        if isinstance(page.record, Start):
-            start = page.record
-        elif isinstance(page.record, HoleRecord):
-            records.append(without_images(page.record))
-        elif isinstance(page.record, Stop):
-            stop = page.record
-    if seal is not None and seal.chain != chain:
-        faults.append("its content is not the sealed one")
-    if faults:
-        raise DocumentError(f"not as it was recorded: {'; '.join(faults)}", source=str(log))
-    if start is None or stop is None or stop.status != "complete":
-        raise DocumentError("expected a complete run; this one "
-                            f"{'died' if stop is None else 'was ' + stop.status}", source=str(log))
+    """Read a sealed recording of a whole run, without its images."""
+    seal = _check_seal(log)
+    pages = [_without_images(page) for page in read_pages(log)]
+    start, stop = pages[0].record, pages[-1].record
+    records = [page.record for page in pages if isinstance(page.record, HoleRecord)]
+    chain = check_chain(seal, pages[-1].chain, len(records),
+                        [fault for page in pages for fault in page.faults])
+    if not chain.passed:
+        raise DocumentError(f"not as it was recorded: {chain.words}", source=str(log))
+    assert isinstance(start, Start)  # `read_pages` sees to it
+    if not isinstance(stop, Stop) or stop.status != "complete":
+        status = f"was {stop.status}" if isinstance(stop, Stop) else "died"
+        raise DocumentError(f"expected a complete run; this one {status}", source=str(log))
     papers = Papers.parse(start.papers, start.set_id)
     return Recorded(log, start, papers, judge_master_run(papers, start, records))
+
+
+def _check_seal(log: Path) -> Seal:
+    """What every later body is corrected by is learnt from sealed recordings alone."""
+    if not log.is_file():
+        raise DocumentError("there is no such recording", source=str(log))
+    seal, checks = check_seal(log)
+    failed = [check.words for check in checks if check.passed is False or seal is None]
+    if seal is None or failed:
+        raise DocumentError(f"not as it was sealed: {'; '.join(failed)}", source=str(log))
+    return seal
+
+
+def _without_images(page: Page) -> Page:
+    record = page.record
+    return replace(page, record=without_images(record)) if isinstance(record, HoleRecord) else page
 
 
 def _check_they_belong_together(recordings: Sequence[Recorded]) -> None:

@@ -18,6 +18,7 @@ from cell.core.observation import Observation, View
 from cell.metrology.decide import judge_run
 from cell.programs.offsets import study_offsets, write_offsets
 from cell.recording import Recorder
+from cell.recording.seal import seal_path
 
 __all__ = ["workplace"]
 
@@ -189,13 +190,22 @@ def test_another_jobs_recording_and_changed_papers_are_refused(workplace, master
             study_offsets([*masters, odd], days=30)
 
 
-def test_too_few_runs_and_altered_ones_are_refused(masters):
+def test_too_few_runs_are_refused(masters):
     with pytest.raises(DocumentError, match="at least 3 runs"):
         study_offsets(masters[:2], days=30)
     with pytest.raises(DocumentError, match="stands twice"):
         study_offsets([*masters[:2], masters[0]], days=30)
+
+
+def test_altered_unsealed_and_absent_recordings_are_refused(masters):
+    seal_path(masters[1]).unlink()
+    with pytest.raises(DocumentError, match=r"m1\.rrd: not as it was sealed: unsealed"):
+        study_offsets(masters, days=30)
     blob = bytearray(masters[0].read_bytes())
     blob[len(blob) // 2] ^= 0x40
     masters[0].write_bytes(bytes(blob))
-    with pytest.raises(DocumentError, match=r"m0\.rrd"):
+    with pytest.raises(DocumentError, match=r"m0\.rrd: not as it was sealed: altered"):
+        study_offsets(masters, days=30)
+    masters[0].unlink()
+    with pytest.raises(DocumentError, match=r"m0\.rrd: there is no such recording"):
         study_offsets(masters, days=30)
