@@ -29,7 +29,7 @@ from cell.metrology.profile_fit import fit_profile, locate_edges
 from cell.metrology.reasons import refusal
 from cell.metrology.rim_fit import agree, settle
 from cell.metrology.spread import correlation_length, robust_sigma
-from cell.metrology.wall import predict_wall, suspect_walls
+from cell.metrology.wall import lit, predict_wall, suspect_walls
 
 WIDE = 8.0             # px to either side, where edges are looked for first
 OUTWARD = 3.0          # px of sheet in a grey profile: more would add its texture
@@ -64,8 +64,8 @@ def detect_rim(image: Image, hole: Hole, camera: CameraModel, expected: Expected
     check_inside(image, hole.ellipse)
     rough, seen, doubled = _rough_rim(hole)
     walls = [predict_wall(rough, hole.inside, camera, expected)]
-    if doubled and walls[0].share == 0.0:
-        walls += suspect_walls(walls[0])
+    known = expected.normal is not None and expected.thickness is not None
+    walls += [lit(walls[0])] if known or not doubled else suspect_walls(walls[0])
     band = _profiles(hole.patch, rough, max(wall.widest for wall in walls))
     rays = np.repeat(seen, -(-len(band.t) // len(seen)))[:len(band.t)]
     profile = fit_profile(band, rays, walls, doubled=doubled or hole.inside > 0)

@@ -21,9 +21,7 @@ from cell.metrology.wall import Wall
 STEPS = 7
 SETTLED = 0.005       # px and shares: below, the fit has arrived
 THINNED = 2           # every second ray tells enough of blur and wall
-SHARE_SIGMA, SHARE_SWING = 0.2, 0.1   # of k before looking, and of its change round the rim
 DARKEST, BRIGHTEST = -0.6, 1.3        # k
-CLEARLY = 0.95                        # of the misfit, to be better
 NOTABLE_WALL = 1.5                    # px
 NARROWEST, WIDEST, USUAL_BLUR = 0.4, 6.0, 1.2  # px
 PIXELS_PER_ERROR = 30.0  # texture and smoothing: so many pixels go wrong together
@@ -38,7 +36,7 @@ class RimModel:
         self.around = np.column_stack([np.ones_like(band.t), np.cos(band.t), np.sin(band.t)])
         self.prior = np.array([0.0] * 5 + [USUAL_BLUR, *wall.shift, wall.share, 0.0, 0.0])
         self.sigma = np.array([np.inf] * 6 + [wall.sigma] * 2
-                              + [SHARE_SIGMA, SHARE_SWING, SHARE_SWING])
+                              + [wall.share_sigma, wall.share_sigma / 2.0, wall.share_sigma / 2.0])
 
     def read(self, x: Array) -> Profile:
         """Turn the eleven numbers into what each ray shows."""
@@ -65,7 +63,8 @@ def fit_profile(band: Band, rays: Mask, walls: list[Wall], *, doubled: bool = Tr
     """Fit ellipse, blur and wall together to the pixels of the `rays` (n,) that agree.
 
     Where a wall of some width is to be expected, the band's ellipse may lie on its far side: the
-    fit starts from both. Of all starts, the one that explains the pixels clearly better wins.
+    fit starts from both. Of all starts, the one that explains the pixels better by what the
+    wall is worth wins.
 
     Args:
         band: the profiles.
@@ -82,7 +81,7 @@ def fit_profile(band: Band, rays: Mask, walls: list[Wall], *, doubled: bool = Tr
             starts.append(model.prior + model.onto_near_rim(wall))
         for start in starts:
             state, misfit = _descend(model, sparse, start)
-            if misfit < CLEARLY * least:
+            if misfit < wall.worth * least:
                 best, least, chosen = state, misfit, wall
     return RimModel(band, chosen).read(best)
 

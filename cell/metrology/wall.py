@@ -7,7 +7,7 @@ darker than the sheet; an edge finder that knows two levels only is drawn to its
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,20 +19,25 @@ from cell.metrology.features import Expected
 USUAL_THICKNESS = 1.2   # mm
 USUAL_DISTANCE = 250.0  # mm
 SUSPECTED = 3.5         # px, the shift of a far rim that shows without having been predicted
-USUAL_SHARE = 0.15      # of the step from hole to sheet, taken by a wall that is known to show
+LITTLE, MUCH = 0.98, 0.85      # of the misfit: evidence for a wall that was expected, or not
+HARDLY, BRIGHTLY = 0.02, 0.25  # share, of the step from hole to sheet, that walls take or do not
 USUAL_TILT = 0.06       # rad, the standard deviation of a tilt that nothing is known of
 
 
 @dataclass(frozen=True, eq=False)
 class Wall:
     """The far rim against the near one, px: moved by `shift` (2,), each +- `sigma`, and smaller
-    by `shrink`. `share` is what part of the step from hole to sheet a wall usually takes.
+    by `shrink`. `share` is what part of the step from hole to sheet the wall takes, `share_sigma`
+    how well that is known; `worth` the share of the misfit that has to remain below for the wall to
+    be believed.
     """
 
     shift: Array
     sigma: float
     shrink: float
     share: float
+    share_sigma: float
+    worth: float = 1.0
 
     @property
     def widest(self) -> float:
@@ -59,13 +64,18 @@ def predict_wall(rim: Ellipse, inside: int, camera: CameraModel, expected: Expec
     far = project_circle(camera, depth * ray - thickness * normal, normal, rim.radius / scale)
     known = expected.thickness is not None and expected.normal is not None
     unsure = expected.normal_sigma if known else USUAL_TILT
-    share = (USUAL_SHARE if inside < 0 else 1.0) if known else 0.0
+    share = 0.0 if inside < 0 else 1.0
     return Wall(far.centre - near.centre, 0.05 + thickness * unsure * scale,
-                near.radius - far.radius, share)
+                near.radius - far.radius, share, HARDLY if inside < 0 or not known else BRIGHTLY)
+
+
+def lit(wall: Wall) -> Wall:
+    """Let the wall be as bright as it may."""
+    return replace(wall, share=max(wall.share, BRIGHTLY), share_sigma=BRIGHTLY, worth=LITTLE)
 
 
 def suspect_walls(predicted: Wall) -> list[Wall]:
     """List walls on all sides, for a rim that shows two edges where nothing was predicted."""
     turn = np.arange(8) * np.pi / 4.0
     return [Wall(SUSPECTED * np.array([np.cos(t), np.sin(t)]), SUSPECTED / 2.0, predicted.shrink,
-                 0.5) for t in turn]
+                 0.5, BRIGHTLY, worth=MUCH) for t in turn]

@@ -33,7 +33,7 @@ MEASURABLE = {
     "neighbour": ({"neighbour": True, "radius": 3.0}, 0.08, 0.08),
     "bright wall": ({"wall": 70.0, **TILTED}, 0.1, 0.15),
     "dim wall": ({"wall": 25.0, **TILTED}, 0.05, 0.3),
-    "blurred": ({"blur": 2.0}, 0.1, 0.1),
+    "a little soft": ({"blur": 2.0}, 0.1, 0.1),
     "noisy": ({"noise": 10.0}, 0.08, 0.08),
     "black": ({"plate": 30.0, "behind": 4.0, "wall": 6.0, "noise": 2.0}, 0.1, 0.1),
     "bright behind": ({"plate": 40.0, "behind": 110.0, "wall": 30.0}, 0.15, 1.0),
