@@ -27,6 +27,8 @@ def shift(file: Path | None = typer.Argument(None, help="The shift's file, jobs/
                                       "time; simulated cells only."),
           logs: Path = typer.Option(Path("logs"), "--logs", help="Where recordings and results "
                                     "lie."),
+          live: bool = typer.Option(False, "--live", help="Show every body in a viewer on this "
+                                    "machine: `cell view --live`."),
           report: bool = typer.Option(False, "--report", help="Only write the report of the last "
                                       "shift of this file, running or not."),
           registers: bool = typer.Option(False, "--registers", help="Print the Modbus register "
@@ -46,8 +48,10 @@ def shift(file: Path | None = typer.Argument(None, help="The shift's file, jobs/
         return
     if file is None:
         raise typer.BadParameter("which shift? give its file", param_hint="FILE")
-    answer, code = (_report_only(file, logs), 0) if report else \
-        _run(file, simulate, bodies, speed, logs)
+    if report:
+        answer, code = _report_only(file, logs), 0
+    else:
+        answer, code = _run(file, logs, simulate=simulate, bodies=bodies, speed=speed, live=live)
     if as_json:
         print_json(answer)
     else:
@@ -56,15 +60,14 @@ def shift(file: Path | None = typer.Argument(None, help="The shift's file, jobs/
     raise typer.Exit(code)
 
 
-def _run(file: Path, simulate: bool, bodies: int | None, speed: float,
-         logs: Path) -> tuple[dict[str, Any], int]:
+def _run(file: Path, logs: Path, **options: Any) -> tuple[dict[str, Any], int]:  # noqa: ANN401
     from cell.programs.shift.report import write_shift_report
     from cell.programs.shift.run import ShiftRequest, run_shift
 
     signal.signal(signal.SIGTERM, _interrupt)
     typed = sys.stdin if sys.stdin.isatty() else None
     with _screen() as show:
-        done = run_shift(ShiftRequest(file, logs, simulate, bodies, speed, typed), show, _tell)
+        done = run_shift(ShiftRequest(file, logs, typed=typed, **options), show, _tell)
     written = write_shift_report(logs, done.document, done.began, done.ended)
     answer = {"shift": done.document.name, "bodies": done.bodies, "booked": done.all_booked,
               "report": str(written.html), "csv": str(written.csv)}

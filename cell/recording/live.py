@@ -32,7 +32,7 @@ FAREWELL_S = 3.0
 
 
 class LiveView:
-    """Shows a run in a viewer on this machine: `cell view --live`."""
+    """Shows runs, one after the other, in a viewer on this machine: `cell view --live`."""
 
     def __init__(self, port: int = LIVE_PORT) -> None:
         """Aim at a viewer on a port of the loopback interface; it need not be there."""
@@ -47,6 +47,7 @@ class LiveView:
 
     def show(self, paper: Start | HoleRecord | Stop) -> None:
         """Show one more paper of the run. Never raises, never waits."""
+        self._holes = 0 if isinstance(paper, Start) else self._holes
         self._waiting.append((self._holes, paper))
         self._holes += isinstance(paper, HoleRecord)
         self._something.set()

@@ -28,6 +28,7 @@ from cell.programs.shift.machine import Shift
 from cell.programs.shift.measuring import Measuring
 from cell.programs.shift.station_cell import StationCell
 from cell.programs.station import Station, open_station
+from cell.recording.live import LiveView
 from cell.results.approvals import approved
 from cell.results.booking import Row
 from cell.results.database import Database, open_database
@@ -47,6 +48,7 @@ class ShiftRequest:
     simulate: bool = False
     bodies: int | None = None
     speed: float = 1.0
+    live: bool = False
     typed: Iterable[str] | None = None
 
 
@@ -89,7 +91,8 @@ def run_shift(request: ShiftRequest, show: Callable[[Board], None],
         clock = WatchedClock()
         ledger = Ledger(database, document.cell, document.name, books.mirror)
         desk = Desk(document, line, ledger, clock, show)
-        cell = StationCell(station, jobs, request.logs)
+        live = closing.enter_context(LiveView()) if request.live else None
+        cell = StationCell(station, jobs, request.logs, live)
         began = clock.now()
         shift = Shift(desk, cell, Measuring(desk, cell, books), _Archive(database))
         shift.run(request.bodies)

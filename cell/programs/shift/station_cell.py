@@ -6,7 +6,6 @@ import errno
 import os
 import shutil
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 from cell.archive.logs import new_log
@@ -41,7 +40,7 @@ class StationCell:
         """
         self._check_room()
         prepared, log = self._prepared[job.name], new_log(self._logs, job.name)
-        start = replace(begin(prepared, self._station, body_id, log.stem), trial=trial)
+        start = begin(prepared, self._station, body_id, log.stem, trial=trial)
         recorder = Recorder(log, start, self._live)
         inspection = BodyInspection(self._station, prepared, start, recorder, _unwatched)
         return Begun(start, inspection, lambda: _chain_of(log))
