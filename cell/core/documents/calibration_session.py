@@ -13,7 +13,7 @@ from cell.core.documents.station import NotNegative, Positive
 from cell.core.documents.targets import BoardDocument
 from cell.core.geometry import Transform
 
-Purpose = Literal["start", "fit", "hold_out", "sphere"]
+Purpose = Literal["start", "fit", "hold_out"]
 
 
 class CalibrationPlan(Document):
@@ -27,7 +27,6 @@ class CalibrationPlan(Document):
     board: str | None = None
     views: Annotated[int, Field(ge=6, le=80)] = 20
     hold_out: Annotated[int, Field(ge=0, le=10)] = 5
-    sphere_views: Annotated[int, Field(ge=0, le=20)] = 8
     goal_mm: Positive = 0.06
     early_stop: bool = True
     lean_deg: Positive = 32.0
@@ -35,7 +34,6 @@ class CalibrationPlan(Document):
     depth_mm: Positive = 22.0
     aside_mm: NotNegative = 6.0
     gates: Literal["fine", "coarse"] = "fine"
-    kinematics: bool = False
     activate: bool = True
     reason: str = ""
 

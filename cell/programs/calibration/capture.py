@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from cell.core.documents.base import Matrix4, Vector6
 from cell.core.documents.calibration_session import Purpose, ViewRecord
 from cell.core.geometry import Transform
-from cell.core.observation import Light, View
+from cell.core.observation import View
 from cell.core.ports import Joints, Move
 from cell.programs.calibration.session import Session
 from cell.programs.inspection.look import take_view
@@ -43,15 +44,19 @@ def drive(station: Station, path: Sequence[Joints]) -> None:
 
 
 def shoot(station: Station) -> Shots:
-    """Take both pictures; the laser burns for one of them and no longer.
+    """Let the arm settle and take both pictures; the laser burns for one of them and no longer.
 
     Raises:
         DeviceError: robot, lights or camera failed; the lights are off.
     """
     camera = station.document.camera
     try:
-        ring = _look(station, "ring", camera.exposure_ring_s)
-        return Shots(ring, _look(station, "laser", camera.exposure_laser_s))
+        arrived = time.monotonic()
+        station.lights.set("ring")
+        station.pause(station.document.robot.settle_s, since=arrived)
+        ring = take_view(station, "ring", camera.exposure_ring_s, 0)
+        station.lights.set("laser")
+        return Shots(ring, take_view(station, "laser", camera.exposure_laser_s, 0))
     finally:
         station.lights.off()
 
@@ -85,7 +90,3 @@ def as_six(values: Sequence[float]) -> Vector6:
     a, b, c, d, e, f = (float(value) for value in values)
     return a, b, c, d, e, f
 
-
-def _look(station: Station, light: Light, exposure: float) -> View:
-    station.lights.set(light)
-    return take_view(station, light, exposure, 0)

@@ -22,6 +22,7 @@ from cell.programs.station import Station
 
 TRIES = 3
 ENOUGH = 12  # views before an early stop
+FEWEST_TO_PREDICT = 3
 
 
 @dataclass(eq=False)
@@ -32,7 +33,7 @@ class Gathering:
     belief: Belief
     station: Station
     operator: Operator | None = None
-    seen: list[SeenView] = field(default_factory=list)
+    known: list[HandEyeView] = field(default_factory=list)
 
     def gather(self) -> None:
         """Capture all planned views that are not on the disk yet.
@@ -42,8 +43,9 @@ class Gathering:
             DocumentError: the operator quit, or the disk refuses.
         """
         done = {view.number: view for view in self.session.views}
-        self.seen = [self.see_again(view) for view in done.values()
-                     if view.status == "ok" and view.purpose == "fit"]
+        for view in done.values():
+            if view.status == "ok" and view.purpose == "fit":
+                self._know(self.see_again(view))
         for number, (purpose, joints) in enumerate(self.session.header.targets):
             if purpose == "start" or number in done or self._skips(purpose):
                 continue
@@ -87,13 +89,14 @@ class Gathering:
     def _keep(self, shots: Shots, number: int, purpose: Purpose) -> None:
         view = self._see(shots, number, purpose)
         record(self.session, number, purpose, shots, len(view.board.pixels), "ok")
-        before = self.predicted
+        before = after = self.predicted()
         if purpose == "fit":
-            self.seen.append(view)
+            self._know(view)
+            after = self.predicted()
         stripe = "" if view.stripe is not None else "   no stripe"
         self._tell(f"{number:02}/{self._last} ok {purpose:8} {len(view.board.pixels)} corners"
                    f"{stripe} | predicted uncertainty {_figure(before)} -> "
-                   f"{_figure(self.predicted)} mm (goal {self.session.header.plan.goal_mm:.3f})")
+                   f"{_figure(after)} mm (goal {self.session.header.plan.goal_mm:.3f})")
 
     def _see(self, shots: Shots, number: int, purpose: Purpose) -> SeenView:
         view = ViewRecord(number=number, purpose=purpose, joints=as_six(shots.ring.joints),
@@ -103,22 +106,23 @@ class Gathering:
         return see_view(view, shots.ring.image, shots.stripe.image, self.belief,
                         design_of(self.session.header.board))
 
-    @property
     def predicted(self) -> float:
-        """The predicted uncertainty (mm) of a point after the views so far; NaN before two."""
-        if len(self.seen) < 2:
+        """Predict the uncertainty (mm) of a point after the views so far; NaN before three."""
+        if len(self.known) < FEWEST_TO_PREDICT:
             return float("nan")
-        boards = locate_boards([view.board for view in self.seen], self.belief.sensor.camera)
-        problem = HandEyeProblem(tuple(HandEyeView(view.record.pose, board)
-                                       for view, board in zip(self.seen, boards, strict=True)))
         place = Transform(np.array(self.session.header.base_from_board))
-        return predict_point_sigma(problem, self.belief.flange_from_camera, place,
+        return predict_point_sigma(HandEyeProblem(tuple(self.known)),
+                                   self.belief.flange_from_camera, place,
                                    self.belief.sensor.working_distance)
+
+    def _know(self, view: SeenView) -> None:
+        board = locate_boards([view.board], self.belief.sensor.camera)[0]
+        self.known.append(HandEyeView(view.record.pose, board))
 
     def _skips(self, purpose: Purpose) -> bool:
         plan = self.session.header.plan
-        return (purpose == "fit" and plan.early_stop and len(self.seen) >= ENOUGH
-                and self.session.header.what == "hand-eye" and self.predicted <= plan.goal_mm)
+        return (purpose == "fit" and plan.early_stop and len(self.known) >= ENOUGH
+                and self.session.header.what == "hand-eye" and self.predicted() <= plan.goal_mm)
 
     def _go(self, joints: tuple[float, ...]) -> None:
         start = self.session.header.targets[0][1]

@@ -9,7 +9,7 @@ import numpy as np
 
 from cell.core.documents.calibration_session import ViewRecord
 from cell.core.errors import DocumentError, UnmeasurableError
-from cell.core.geometry import Array, Transform
+from cell.core.geometry import Array
 from cell.core.observation import Image
 from cell.core.optics import CameraModel
 from cell.metrology.board_pose import BoardView, locate_boards
@@ -157,7 +157,16 @@ def plane_figures(result: LightPlaneResult) -> dict[str, float]:
             "normal_sigma_deg": float(np.degrees(result.normal_sigma))}
 
 
-def board_in_base(view: SeenView, belief: Belief) -> Transform:
-    """Say where the board stands by this view and what is believed of sensor and mount."""
-    board = locate_boards([view.board], belief.sensor.camera)[0]
-    return view.record.pose @ belief.flange_from_camera @ board.camera_from_board
+def board_shift(before: SeenView, again: SeenView, belief: Belief) -> float:
+    """Say how far (mm) the board has moved between two views from one place.
+
+    The board pose of the first, seen from where the arm stands now, is held against the corners:
+    what a picture tells across the line of sight is some ten times better than along it.
+    """
+    first, camera = locate_boards([before.board], belief.sensor.camera)[0], belief.sensor.camera
+    base_from_camera = again.record.pose @ belief.flange_from_camera
+    camera_from_board = (base_from_camera.inverse @ before.record.pose @ belief.flange_from_camera
+                         @ first.camera_from_board)
+    misses = camera.project(camera_from_board @ again.board.points_in_board) - again.board.pixels
+    distance = float(camera_from_board.translation[2])
+    return float(np.linalg.norm(misses.mean(axis=0))) * distance / float(camera.matrix[0, 0])

@@ -29,7 +29,7 @@ from cell.programs.calibration.gathering import Gathering
 from cell.programs.calibration.make_set import Signature, make_set
 from cell.programs.calibration.poses import free_path, plan_poses, plan_start
 from cell.programs.calibration.session import Session, latest_session
-from cell.programs.calibration.solve import Solution, board_in_base, solve_session
+from cell.programs.calibration.solve import Solution, board_shift, solve_session
 from cell.programs.station import Station, open_station
 
 What = Literal["camera", "light-plane", "hand-eye", "all"]
@@ -152,11 +152,10 @@ def _check_old_view(view: ViewRecord, session: Session, belief: Belief, station:
     gathering = Gathering(session, belief, station)
     before = gathering.see_again(view)
     again = gathering.look(view.number, view.purpose)
-    middle = design_of(session.header.board).middle
-    shift = board_in_base(again, belief) @ middle - board_in_base(before, belief) @ middle
-    if float((shift @ shift) ** 0.5) > SAME_PLACE:
-        raise DocumentError(f"the board stands {float((shift @ shift) ** 0.5):.2f} mm from where "
-                            "it stood: begin again", source=str(session.folder))
+    shift = board_shift(before, again, belief)
+    if shift > SAME_PLACE:
+        raise DocumentError(f"the board stands {shift:.2f} mm from where it stood: begin again",
+                            source=str(session.folder))
 
 
 def _check_preconditions(belief: Belief, board: BoardDocument, station: Station,

@@ -1,0 +1,156 @@
+"""The wizard on the virtual cell, whose truth differs from what the active set believes."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_operator import Scripted
+from made_scenes import demo_world
+
+from cell.archive.activation import history
+from cell.archive.files import read_text
+from cell.archive.sets import active_set, check_set, read_set
+from cell.core.documents.calibration import HandEyeDocument, SensorDocument
+from cell.core.documents.calibration_session import CalibrationPlan
+from cell.core.documents.text import parse
+from cell.core.errors import DocumentError
+from cell.core.geometry import Transform
+from cell.programs.calibration.belief import read_belief
+from cell.programs.calibration.session import Session
+from cell.programs.calibration.solve import solve_session
+from cell.programs.calibration.wizard import Request, conclude, run_wizard
+
+ROOT = Path(__file__).parents[2]
+PLAN = CalibrationPlan(views=13, hold_out=4, reason="a trial")
+pytestmark = pytest.mark.timeout(400)
+
+
+@pytest.fixture(scope="module")
+def plant(tmp_path_factory):
+    """A cell's folder to spoil."""
+    folder = tmp_path_factory.mktemp("plant") / "calibration"
+    shutil.copytree(ROOT / "calibration", folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def cut_off(plant):
+    """A session that broke off after eight of its views."""
+    class Quits(Scripted):
+        def tell(self, message):
+            super().tell(message)
+            if message.startswith("08/"):
+                raise KeyboardInterrupt
+
+    operator = Quits()
+    with pytest.raises(KeyboardInterrupt):
+        run_wizard(Request("all", "demo", PLAN, plant, speed=20.0), operator)
+    return operator
+
+
+@pytest.fixture(scope="module")
+def finished(plant, cut_off):
+    """The same session, gone on with to its end."""
+    sessions = list((plant / "demo" / "sessions").iterdir())
+    assert len(sessions) == 1
+    with (sessions[0] / "views.jsonl").open("a") as lines:
+        lines.write('{"number": 9, "purpose": "fi')  # a line that the crash cut short
+    operator = Scripted()
+    done = run_wizard(Request("all", "demo", PLAN, plant, speed=20.0, resume=True), operator)
+    return done, operator
+
+
+def chain_error(folder, set_id):
+    """How far (mm, rms) pixels of the stripe are carried wrongly to the flange, by the truth."""
+    texts = read_set(folder, set_id).texts
+    sensor = parse(SensorDocument, texts["sensor"], "sensor").model
+    mount = Transform(np.array(parse(HandEyeDocument, texts["hand_eye"], "h").flange_from_camera))
+    world = demo_world()
+    pixels = np.array([[x, y] for x in (150.0, 384.0, 620.0) for y in (120.0, 288.0, 460.0)])
+    true = world.flange_from_camera @ world.sensor.light_plane.meet(
+        world.sensor.camera.rays(pixels))
+    gap = mount @ sensor.light_plane.meet(sensor.camera.rays(pixels)) - true
+    return float(np.sqrt(np.mean(np.sum(gap ** 2, axis=1))))
+
+
+def test_every_view_is_on_the_disk_when_it_is_told(plant, cut_off):
+    session = Session.read(next((plant / "demo" / "sessions").iterdir()))
+    ok = [view for view in session.views if view.number <= 8]
+    assert len(ok) == 8
+    assert cut_off.heard("squares measured by CMM")
+    assert cut_off.heard("corners ") and cut_off.heard("predicted uncertainty")
+
+
+def test_it_goes_on_where_it_was_cut_off(finished):
+    done, operator = finished
+    assert operator.heard("8 views are there")
+    assert not operator.heard("01/17") and operator.heard("17/17")
+    assert len({view.number for view in Session.read(done.session).views}) == 17
+
+
+def test_the_set_is_better_than_what_it_began_with(plant, finished):
+    done, _ = finished
+    folder = plant / "demo"
+    assert done.solution.verdict in ("pass", "warn") and done.active
+    assert active_set(folder) == done.set_id
+    assert chain_error(folder, done.set_id) < 0.12 < chain_error(folder, "2026-11-20a")
+    assert [line.set for line in history(folder)] == ["2026-11-20a", done.set_id]
+
+
+def test_the_set_is_whole_and_carries_its_evidence(plant, finished):
+    done, _ = finished
+    home = plant / "demo" / "sets" / done.set_id
+    check_set(home)
+    report = read_text(home / "report.html")
+    assert report.count("data:image/png;base64") == 6 and "Uncertainty" in report
+    assert len(list((home / "images").glob("*.png"))) >= 34
+    document = parse(HandEyeDocument, read_text(home / "hand_eye.yaml"), "hand_eye")
+    assert document.robot.kinematics_checksum and document.covariance is not None
+    sensor = parse(SensorDocument, read_text(home / "sensor.yaml"), "sensor")
+    assert sensor.camera_covariance and sensor.light_plane_covariance
+
+
+def test_held_out_views_were_not_fitted(finished):
+    answer = finished[0].solution.hand_eye
+    assert len(answer.apart) == 4 and not set(answer.apart) & set(answer.used)
+    assert answer.figures["holdout_rms_mm"] < 0.2
+
+
+def test_the_same_pictures_give_the_same_set_again(plant, finished):
+    done, _ = finished
+    belief = read_belief(plant, "demo")
+    again = solve_session(Session.read(done.session), belief)
+    first, second = (one.hand_eye.held_out.result.carrier_from_camera
+                     for one in (done.solution, again))
+    assert first.distance(second) < (0.005, 1e-4)
+
+
+def test_a_concluded_session_cannot_be_gone_on_with(plant, finished):
+    with pytest.raises(DocumentError, match="no open session of `all`"):
+        run_wizard(Request("all", "demo", PLAN, plant, speed=20.0, resume=True), Scripted())
+
+
+@pytest.mark.parametrize("no_to", ["Is this the robot", "Is the way clear"])
+def test_nothing_moves_without_consent(plant, finished, no_to):
+    before = sorted((plant / "demo" / "sessions").iterdir())
+    with pytest.raises(DocumentError, match="stopped by the operator"):
+        run_wizard(Request("hand-eye", "demo", PLAN, plant, speed=20.0),
+                   Scripted({no_to: False}))
+    assert sorted((plant / "demo" / "sessions").iterdir()) == before
+
+
+def test_warnings_need_a_reason(plant, finished, tmp_path):
+    done, _ = finished
+    folder = shutil.copytree(done.session, tmp_path / "session")
+    header = json.loads((folder / "session.json").read_text())
+    header["plan"]["reason"] = ""
+    keep = [line for line in (folder / "views.jsonl").read_text().splitlines()
+            if line.endswith("}")]
+    (folder / "views.jsonl").write_text("\n".join(keep[:13]))
+    (folder / "session.json").write_text(json.dumps(header))
+    operator = Scripted()
+    result = conclude(Session.read(folder), read_belief(plant, "demo"), operator)
+    assert result.set_id is None
+    assert operator.heard("Why is this set acceptable") or operator.heard("Refused")
