@@ -10,8 +10,8 @@ import rerun.blueprint as rrb
 from cell.core.documents.nominals import Hole
 from cell.core.documents.papers import Papers
 from cell.recording import layout
-from cell.recording.body_scene import EXAGGERATION, PLOT, TABLE, VERDICT
-from cell.recording.hole_scene import LASER, RING, SUMMARY
+from cell.recording.body_scene import EXAGGERATION, PLOT, TABLE
+from cell.recording.hole_scene import LASER, RING, VERDICT
 
 
 def build_blueprint(papers: Papers, following: bool = False) -> rrb.Blueprint:
@@ -47,7 +47,7 @@ def _seen(papers: Papers) -> rrb.Vertical:
 
 def _said() -> rrb.Vertical:
     return rrb.Vertical(
-        rrb.Tabs(rrb.TextDocumentView(origin=SUMMARY, name="this hole"),
+        rrb.Tabs(rrb.TextDocumentView(origin=VERDICT, name="this hole"),
                  rrb.TextDocumentView(origin=TABLE, name="the body")),
         rrb.TimeSeriesView(origin=PLOT, name="deviation as share of its tolerance, hole by hole",
                            plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop)),

@@ -11,13 +11,13 @@ from cell.core.documents.nominals import AXES, Hole
 from cell.core.documents.result import BodyResult, Feature
 from cell.core.geometry import Array
 from cell.recording import colours
-from cell.recording.hole_scene import Drawing, markdown
+from cell.recording.hole_scene import VERDICT, Drawing, markdown
 
 EXAGGERATION = 40.0
 """How much longer than life a deviation is drawn: 1 mm shows as 40 mm."""
 
-NOMINAL, MEASURED, DEVIATION = "/body/nominal", "/body/measured", "/body/deviation"
-PLOT, LIMITS, VERDICT, TABLE = "/deviation", "/deviation/limits", "/verdict", "/result"
+NOMINAL, MEASURED = "/body/nominal", "/body/measured"
+PLOT, LIMITS, TABLE = "/deviation", "/deviation/limits", "/result"
 ROUND = np.linspace(0.0, 2.0 * np.pi, 37)
 
 
@@ -42,18 +42,17 @@ def draw_features(features: Sequence[Feature], holes: Sequence[Hole]) -> Iterato
     by_id = {hole.id: hole for hole in holes}
     tinted = [colours.VERDICTS[feature.verdict] for feature in features]
     centres = np.array([by_id[feature.id].centre for feature in features]).reshape(-1, 3)
-    yield MEASURED, rr.Points3D(centres, colors=tinted, radii=rr.Radius.ui_points(6.0),
-                                labels=[_label(feature) for feature in features],
-                                show_labels=False)
-    yield DEVIATION, rr.Arrows3D(
-        origins=centres, colors=tinted, radii=rr.Radius.ui_points(1.5),
-        vectors=EXAGGERATION * np.array([_shift(f) for f in features]).reshape(-1, 3))
+    yield (MEASURED,
+           rr.Points3D(centres, colors=tinted, radii=rr.Radius.ui_points(6.0), show_labels=False,
+                       labels=[_label(feature) for feature in features]),
+           rr.Arrows3D(origins=centres, colors=tinted, radii=rr.Radius.ui_points(1.5),
+                       vectors=EXAGGERATION * np.array([_shift(f) for f in features]
+                                                       ).reshape(-1, 3)))
 
 
-def draw_verdict(feature: Feature) -> Iterator[Drawing]:
-    """Draw one feature on the time line: its verdict, and each deviation as share of tolerance."""
+def draw_deviation(feature: Feature) -> Iterator[Drawing]:
+    """Draw one feature into the plot: each deviation as share of its tolerance."""
     deviation = feature.deviation or {}
-    yield VERDICT, rr.StateChange(state=feature.verdict)
     yield PLOT, rr.Scalars([deviation[axis] / feature.tolerance[axis] if axis in deviation
                             else np.nan for axis in AXES])
 

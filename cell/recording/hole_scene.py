@@ -15,8 +15,8 @@ from cell.core.documents.result import Feature, Measured
 from cell.core.geometry import Array
 from cell.recording import colours, layout
 
-Drawing: TypeAlias = tuple[str, rr.AsComponents]
-"""An entity's path, and what to log there."""
+Drawing: TypeAlias = tuple[str, *tuple[rr.AsComponents, ...]]
+"""An entity's path, and what to log there; several things of one entity take less room."""
 
 Colour: TypeAlias = tuple[int, int, int]
 Trace: TypeAlias = Mapping[str, Array]
@@ -24,7 +24,7 @@ Trace: TypeAlias = Mapping[str, Array]
 CROSS = 12.0  # px
 NOTHING = np.zeros((0, 2))
 RING, LASER = layout.IMAGES
-SUMMARY = "/hole_summary"
+VERDICT = "/verdict"
 CAMERA_IMAGE_AT = 120.0  # mm in front of the camera: where the 3D view shows the image
 
 
@@ -44,8 +44,8 @@ def draw_hole(record: HoleRecord, calibration: Calibration) -> Iterator[Drawing]
 
 
 def draw_summary(record: HoleRecord, feature: Feature) -> Iterator[Drawing]:
-    """Write the numbers of a hole."""
-    yield SUMMARY, markdown(summarise(record, feature))
+    """Write the numbers of a hole, and put its verdict on the time line."""
+    yield VERDICT, markdown(summarise(record, feature)), rr.StateChange(state=feature.verdict)
 
 
 def markdown(text: str) -> rr.TextDocument:
@@ -70,11 +70,10 @@ def _draw_trace(trace: Trace) -> Iterator[Drawing]:
     the hole before does not show through.
     """
     a_b_q = np.vstack([trace.get("chord", NOTHING), np.atleast_2d(trace.get("q", NOTHING))])
-    yield f"{RING}/rim", _points(trace.get("rim"), colours.EDGE, 1.5)
-    yield f"{RING}/lines", draw_lines(trace, {
-        "ellipse": colours.ELLIPSE, "across": colours.ELLIPSE, "down": colours.ELLIPSE})
-    yield f"{LASER}/stripe", _points(trace.get("stripe"), colours.STRIPE, 1.5)
-    yield f"{LASER}/lines", draw_lines(trace, {"ellipse": colours.ELLIPSE, "chord": colours.CHORD})
+    yield (f"{RING}/found", _points(trace.get("rim"), colours.EDGE, 1.5),
+           draw_lines(trace, dict.fromkeys(("ellipse", "across", "down"), colours.ELLIPSE)))
+    yield (f"{LASER}/found", _points(trace.get("stripe"), colours.STRIPE, 1.5),
+           draw_lines(trace, {"ellipse": colours.ELLIPSE, "chord": colours.CHORD}))
     yield f"{LASER}/points", _points(a_b_q, colours.CHORD, 4.0, ["A", "B", "Q"])
 
 

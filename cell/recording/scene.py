@@ -13,11 +13,11 @@ from cell.metrology.decide import judge_run
 from cell.recording import layout
 from cell.recording.blueprint import build_blueprint
 from cell.recording.body_scene import (
+    draw_deviation,
     draw_features,
     draw_limits,
     draw_nominals,
     draw_result,
-    draw_verdict,
 )
 from cell.recording.hole_scene import Drawing, draw_camera, draw_hole, draw_summary
 from cell.recording.memory import send_blueprint
@@ -74,12 +74,13 @@ class Scene:
                   for number, record in self._records.items() if number <= at]
         self._at(at)
         self._draw(draw_features(judged, self._papers.holes))
-        self._draw(draw_verdict(judged[-1]))
+        self._draw(draw_deviation(judged[-1]))
         self._draw(draw_summary(self._records[at], judged[-1]))
 
     def _at(self, at: int) -> None:
         self._stream.set_time(layout.HOLE_TIMELINE, sequence=at)
 
     def _draw(self, drawings: Iterable[Drawing], static: bool = False) -> None:
-        for path, drawing in drawings:
-            self._stream.log(path, drawing, static=static)
+        for drawing in drawings:
+            path, things = drawing[0], drawing[1:]
+            self._stream.log(path, things[0], *things[1:], static=static)

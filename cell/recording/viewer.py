@@ -74,11 +74,15 @@ def has_display() -> bool:
 
 
 def _without_analytics(folder: Path) -> dict[str, str]:
-    """Give the viewer a configuration of its own that says no."""
-    (folder / "rerun").mkdir()
-    (folder / "rerun" / "analytics.json").write_text(json.dumps(
-        {"analytics_enabled": False, "analytics_id": "", "metadata": {}}))
-    return {"XDG_CONFIG_HOME": str(folder), "RERUN_STRICT": "1"}
+    """Give the viewer a configuration of its own that says no. All keys are needed: one that it
+    cannot read it replaces by its own, which says yes.
+    """
+    file = folder / "rerun" / "analytics.json"
+    file.parent.mkdir()
+    file.write_text(json.dumps({
+        "analytics_enabled": False, "analytics_id": "none", "metadata": {},
+        "config_file_path": str(file), "data_dir_path": str(folder)}))
+    return {"XDG_CONFIG_HOME": str(folder), "XDG_DATA_HOME": str(folder)}
 
 
 def dying_with_parent(number: signal.Signals) -> Callable[[], None]:

@@ -2,7 +2,9 @@
 that hangs, dies or is not there costs the file nothing.
 """
 
+import json
 import signal
+import socket
 import subprocess
 import time
 
@@ -34,7 +36,7 @@ def drawn(log, path, component):
 
 def test_every_hole_is_drawn_with_what_was_found_in_it(log):
     holes = read(log).holes
-    rims = drawn(log, "/camera/ring/rim", "Points2D:positions")
+    rims = drawn(log, "/camera/ring/found", "Points2D:positions")
     for hole, rim in zip(holes, rims, strict=True):
         np.testing.assert_allclose(rim, hole.outcome.located.trace["rim"], atol=1e-3)
     points = drawn(log, "/camera/laser/points", "Points2D:positions")
@@ -43,7 +45,7 @@ def test_every_hole_is_drawn_with_what_was_found_in_it(log):
 
 def test_the_numbers_beside_it_are_those_of_the_judgement(log):
     result = read(log).stop.result
-    for feature, text in zip(result.features, drawn(log, "/hole_summary", "TextDocument:text"),
+    for feature, text in zip(result.features, drawn(log, "/verdict", "TextDocument:text"),
                              strict=True):
         assert f"{feature.measured['d']:.3f}" in text[0]
         assert f"{feature.deviation['d']:+.3f}" in text[0]
@@ -110,6 +112,19 @@ def test_no_port_of_the_viewer_is_open_to_others():
         pytest.skip("`ss` does not show the viewer's port here")
     assert f"127.0.0.1:{port} " in listening
     assert f"0.0.0.0:{port} " not in listening
+
+
+def test_the_viewer_sends_no_usage_data(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    port = free_port()
+    with viewer_process("--serve-grpc", "--port", str(port)):
+        for _ in range(100):
+            with socket.socket() as trial:
+                if trial.connect_ex(("127.0.0.1", port)) == 0:
+                    break
+            time.sleep(0.1)
+        (settings,) = tmp_path.glob("*/rerun/analytics.json")
+        assert json.loads(settings.read_text())["analytics_enabled"] is False
 
 
 def stop_of(folder):
