@@ -66,7 +66,8 @@ def _describe_one(each: Learnt) -> dict[str, Any]:
     return each.offset.model_dump() | {
         "u_mm": each.u, "cmm_mm": each.cmm, "measured_mm": each.measured,
         "t": each.t if abs(each.t) < float("inf") else None, "p": each.p,
-        "significant": each.is_significant}
+        "significant": each.is_significant, "stated_u_mm": each.stated,
+        "explained": each.is_explained}
 
 
 def _show(learnt: LearntOffsets, out: Path | None) -> None:
@@ -75,10 +76,11 @@ def _show(learnt: LearntOffsets, out: Path | None) -> None:
                   f"{first.start.set_id}: {len(learnt.recordings)} runs over the body "
                   f"{first.start.body_id}; holds until {learnt.expires}", highlight=False)
     answers.print(_table(study))
-    answers.print("offset = CMM - sensor; s of one run, its own and as pooled; u of the offset; "
-                  "p of the t-test against 0", highlight=False)
-    for hole, reason in study.left_out.items():
-        answers.print(f"left out: {hole}: {reason}", highlight=False, soft_wrap=True)
+    answers.print("offset = CMM - sensor; s of one run, and as pooled where that is more; u of the "
+                  "offset; p of the t-test against 0", highlight=False)
+    for reason in dict.fromkeys(study.left_out.values()):
+        holes = [hole for hole, why in study.left_out.items() if why == reason]
+        answers.print(f"left out: {', '.join(holes)}: {reason}", highlight=False, soft_wrap=True)
     for remark in study.remarks:
         answers.print(remark, highlight=False, soft_wrap=True)
     if out is None:
@@ -88,13 +90,21 @@ def _show(learnt: LearntOffsets, out: Path | None) -> None:
 
 
 def _table(study: OffsetsStudy) -> Table:
-    table = Table("hole", "axis", "offset", "n", "s", "s pooled", "u", "p", "", title="mm")
+    table = Table("hole", "axis", "CMM", "measured", "offset", "n", "s", "s used", "u", "p", "",
+                  title="mm")
     for each in study.learnt:
         offset = each.offset
-        table.add_row(offset.hole, offset.axis, f"{offset.value_mm:+.4f}", str(offset.sample_size),
+        table.add_row(offset.hole, offset.axis, f"{each.cmm:.4f}", f"{each.measured.mean():.4f}",
+                      f"{offset.value_mm:+.4f}", str(offset.sample_size),
                       f"{offset.spread_mm:.4f}", f"{offset.repeatability:.4f}", f"{each.u:.4f}",
-                      f"{each.p:.3f}", "significant" if each.is_significant else "")
+                      f"{each.p:.3f}", _word(each))
     return table
+
+
+def _word(each: Learnt) -> str:
+    if not each.is_explained:
+        return "unexplained"
+    return "significant" if each.is_significant else ""
 
 
 def _lost(learnt: LearntOffsets) -> bool:

@@ -29,29 +29,33 @@ from cell.metrology.decide import SAME_STOP_DEG, Circumstances, judge_body
 
 FEWEST_RUNS = 3
 AXES: tuple[Literal["x", "y", "z", "d"], ...] = ("x", "y", "z", "d")
+COVERED = 3.0  # standard uncertainties
 CHANCE = 0.05  # a bias that chance would give more rarely is one
 
 
 @dataclass(frozen=True, eq=False)
 class MasterRun:
-    """One run over the master: its day, and by hole the values by axis (mm, without offsets) and
-    the joints of the stop (rad).
+    """One run over the master: its day, and by hole the values by axis (mm, without offsets), their
+    standard uncertainties, and the joints of the stop (rad).
     """
 
     day: str
     values: Mapping[str, Mapping[str, float]]
+    sigmas: Mapping[str, Mapping[str, float]]
     joints: Mapping[str, Joints]
 
 
 @dataclass(frozen=True, eq=False)
 class Learnt:
-    """One offset and what it was learnt from: `measured` (n,) and `cmm`, mm; the t-test of the
-    differences against zero, `t` infinite where they do not scatter.
+    """One offset and what it was learnt from: `measured` (n,) and `cmm`, mm; `stated` is the
+    standard uncertainty without the offset, mm; the t-test of the differences against zero, `t`
+    infinite where they do not scatter.
     """
 
     offset: Offset
     measured: Array
     cmm: float
+    stated: float
     t: float
     p: float
 
@@ -64,6 +68,11 @@ class Learnt:
     def is_significant(self) -> bool:
         """Whether the sensor's error differs from zero at 5 %."""
         return self.p < CHANCE
+
+    @property
+    def is_explained(self) -> bool:
+        """Whether the stated uncertainty of sensor and CMM covers what the sensor gets wrong."""
+        return abs(self.offset.value_mm) <= COVERED * math.hypot(self.stated, self.u)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +94,11 @@ def judge_master_run(papers: Papers, start: Start, records: Sequence[HoleRecord]
     circumstances = Circumstances.of_run(start, records)
     result = judge_body(replace(papers, offsets=None), [record.outcome for record in records],
                         circumstances)
+    seen = [feature for feature in result.features if feature.measured is not None]
     return MasterRun(circumstances.day,
-                     {feature.id: feature.measured for feature in result.features
-                      if feature.measured is not None}, circumstances.reached)
+                     {feature.id: feature.measured or {} for feature in seen},
+                     {feature.id: feature.uncertainty or {} for feature in seen},
+                     circumstances.reached)
 
 
 def learn_offsets(runs: Sequence[MasterRun], holes: Sequence[Hole], expires: str,
@@ -104,10 +115,18 @@ def learn_offsets(runs: Sequence[MasterRun], holes: Sequence[Hole], expires: str
     known = [hole for hole in holes if hole.id not in reasons]
     single = [learnt for hole in known
               for learnt in _learn(hole, _of_hole(hole, runs), expires, by)]
-    unstated = [hole.id for hole in known if hole.cmm_u is None]
-    remarks = (f"the CMM's uncertainty is not stated, and counts as 0: {', '.join(unstated)}",) \
-        if unstated else ()
-    return OffsetsStudy(tuple(_pooled(single)), reasons, remarks)
+    learnt = tuple(_pooled(single))
+    return OffsetsStudy(learnt, reasons, tuple(_remarks(learnt, known)))
+
+
+def _remarks(learnt: Sequence[Learnt], holes: Sequence[Hole]) -> Iterator[str]:
+    unstated = [hole.id for hole in holes if hole.cmm_u is None]
+    if unstated:
+        yield f"the CMM's uncertainty is not stated, and counts as 0: {', '.join(unstated)}"
+    beyond = [f"{each.offset.hole} {each.offset.axis}" for each in learnt if not each.is_explained]
+    if beyond:
+        yield ("beyond what the stated uncertainty explains: " + ", ".join(beyond)
+               + "; look for the cause (calibration, fixture, CMM values) before correcting it")
 
 
 def _of_hole(hole: Hole, runs: Sequence[MasterRun]) -> list[MasterRun]:
@@ -116,7 +135,7 @@ def _of_hole(hole: Hole, runs: Sequence[MasterRun]) -> list[MasterRun]:
 
 def _why_not(hole: Hole, runs: Sequence[MasterRun]) -> str:
     if not hole.cmm:
-        return "the nominals have no CMM values of it"
+        return "no CMM values in the nominals"
     measured = _of_hole(hole, runs)
     if len(measured) < FEWEST_RUNS:
         return f"measured in {len(measured)} of {len(runs)} runs; at least {FEWEST_RUNS} are needed"
@@ -139,7 +158,8 @@ def _learn(hole: Hole, runs: Sequence[MasterRun], expires: str, by: str) -> Iter
             hole=hole.id, axis=axis, value_mm=_rounded(differences.mean()),
             spread_mm=_rounded(differences.std(ddof=1)), sample_size=len(runs), joints_deg=joints,
             learnt=max(run.day for run in runs), expires=expires, by=by,
-            cmm_u_mm=hole.cmm_u or 0.0), measured, cmm[axis], t, p)
+            cmm_u_mm=hole.cmm_u or 0.0), measured, cmm[axis],
+            float(np.mean([run.sigmas[hole.id][axis] for run in runs])), t, p)
 
 
 def _stop(joints: Sequence[Joints]) -> Vector6:

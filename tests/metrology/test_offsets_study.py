@@ -9,7 +9,7 @@ from cell.core.documents.offsets import OffsetsDocument
 from cell.core.documents.text import dump, parse
 from cell.metrology.offsets_study import MasterRun, learn_offsets
 
-SIGMA = 0.012
+SIGMA, STATED = 0.012, 0.15
 STOP = np.radians([150.0, -90.0, 110.0, -10.0, 60.0, 160.0])
 
 
@@ -30,6 +30,7 @@ def made_runs(holes, count=4, noise=SIGMA, seed=3):
     return [MasterRun(f"2026-11-2{index}",
                       {hole.id: {axis: value + bias_of(hole)[axis] + noise * rng.normal()
                                  for axis, value in hole.cmm.items()} for hole in known},
+                      {hole.id: dict.fromkeys("xyzd", STATED) for hole in known},
                       {hole.id: tuple(STOP + rng.normal(0, 1e-4, 6)) for hole in known})
             for index in range(count)]
 
@@ -103,7 +104,7 @@ def test_what_cannot_be_learnt_is_left_out_with_a_word(holes):
     study = learn(holes, runs)
     assert study.left_out[first] == "measured in 2 of 4 runs; at least 3 are needed"
     assert "stops 3.0 degrees apart" in study.left_out[second]
-    assert study.left_out["BP3"] == "the nominals have no CMM values of it"
+    assert study.left_out["BP3"] == "no CMM values in the nominals"
     assert not {first, second, "BP3"} & {each.offset.hole for each in study.learnt}
 
 
@@ -114,6 +115,18 @@ def test_axes_without_a_cmm_value_and_an_unstated_uncertainty(holes):
     assert [each.offset.axis for each in study.learnt] == ["x", "z"]
     assert hole.id in study.remarks[0]
     assert study.learnt[0].offset.cmm_u_mm == 0.0
+
+
+def test_more_than_the_sensor_admits_is_remarked(holes):
+    """An offset must not hide a broken calibration."""
+    runs = made_runs(holes)
+    assert learn(holes, runs).remarks == ()
+    first = next(hole for hole in holes if hole.cmm)
+    for run in runs:
+        run.values[first.id]["z"] += 0.9
+    study = learn(holes, runs)
+    assert f"explains: {first.id} z;" in study.remarks[0]
+    assert [each.offset.axis for each in study.learnt if not each.is_explained] == ["z"]
 
 
 def test_values_that_do_not_scatter_give_no_nonsense(holes):

@@ -142,7 +142,7 @@ def test_the_command_writes_the_file_and_says_one_object(workplace, masters, cap
     answer = json.loads(capsys.readouterr().out)
     assert (answer["job"], answer["body"], answer["expires"]) == ("demo", "MASTER", "2026-12-05")
     assert len(answer["offsets"][0]["measured_mm"]) == 4
-    assert answer["left_out"]["BP3"] == "the nominals have no CMM values of it"
+    assert answer["left_out"]["BP3"] == "no CMM values in the nominals"
     assert workplace.papers().offsets.offsets[0].by == "M. Meier"
     assert cell("study", "offsets", *masters, "--out", out) == 2
     assert "--replace" in capsys.readouterr().err
