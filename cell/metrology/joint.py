@@ -49,7 +49,7 @@ def locate_joint(rim: Rim, stripes: Sequence[Shot], sensor: SensorModel,
     posterior = solve_circle(rim, stripes, sensor, expected)
     circle = posterior.circle
     _check_against_plan(circle, expected)
-    budget = joint_budget(posterior, rim.ambiguity, sensor)
+    budget = joint_budget(posterior, rim, sensor)
     return Located("joint", circle.centre, circle.radius, circle.normal, total(budget),
                    shares(budget), {**rim.quality, **stripes[0][0].quality},
                    trace_circle(circle, rim, stripes[0][0], sensor), budget)
@@ -94,7 +94,7 @@ def _tangents(normal: Array, stripe: StripeSight) -> Array:
 
 def _prior(start: Circle, rim: Rim, expected: Expected) -> Prior:
     mm_per_px = start.radius / float(np.sqrt(rim.ellipse[2] * rim.ellipse[3]))
-    form_sigma = float(np.hypot(FORM_SIGMA, one_sided(rim.ambiguity) * mm_per_px))
+    form_sigma = float(np.hypot(FORM_SIGMA, one_sided(rim) * mm_per_px))
     radius = start.radius if expected.radius is None else expected.radius
     radius_sigma = UNKNOWN_RADIUS_SIGMA if expected.radius is None else RADIUS_SIGMA
     return Prior(np.zeros(2), np.full(2, normal_sigma(expected)), form_sigma, radius,

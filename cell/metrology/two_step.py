@@ -81,7 +81,7 @@ def locate_two_step(rim: Rim, stripe: Stripe, sensor: SensorModel, expected: Exp
     held = replace(expected, normal_sigma=HELD)
     solution = solve_circle(rim, [(stripe, Transform.identity())], sensor, held).solutions[0]
     budget = two_step_budget(np.append(solved.centre, solved.radius), solution,
-                             normal_sigma(expected), rim.ambiguity, sensor)
+                             normal_sigma(expected), rim, sensor)
     trace = {"chord": np.stack([solved.A, solved.B]), "q": solved.Q, "centre": solved.centre}
     return Located("two-step", solved.centre, solved.radius, None, total(budget), shares(budget),
                    {**rim.quality, **stripe.quality},

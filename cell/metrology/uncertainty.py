@@ -25,6 +25,7 @@ import numpy as np
 from cell.core.geometry import Array
 from cell.core.optics import SensorModel
 from cell.metrology.error_model import two_step_error
+from cell.metrology.features import Rim
 from cell.metrology.joint_problem import Seen, Solution
 from cell.metrology.joint_rows import RADIUS
 from cell.metrology.posterior import Posterior
@@ -35,6 +36,7 @@ Budget: TypeAlias = dict[str, Array]
 FORM_SIGMA = 0.004  # mm, each wave of the rim: what punched and drilled holes show
 CENTRE_DOUBT, RADIUS_DOUBT = 0.02, 0.09  # px: what light and edge break do to a clean rim
 AMBIGUITY, SHARE = (0.3, 0.8), (0.13, 0.35)  # px, and the share of it that moves a centre
+COMPLETE, HIDING = 0.8, 1.5  # of a rim are seen; px by which each share that is missing may mislead
 SHOWN = [0, 1, 2, RADIUS]
 
 
@@ -48,30 +50,30 @@ def shares(budget: Budget) -> dict[str, tuple[float, float, float, float]]:
     return {source: _deviations(covariance) for source, covariance in budget.items()}
 
 
-def joint_budget(posterior: Posterior, ambiguity: float, sensor: SensorModel) -> Budget:
-    """Split the uncertainty of the joint estimate by source; `ambiguity` px as in `Rim`.
+def joint_budget(posterior: Posterior, rim: Rim, sensor: SensorModel) -> Budget:
+    """Split the uncertainty of the joint estimate by source.
 
     What lies between several solutions is what the normal's prior left open.
     """
     budget: Budget = {"normal_prior": posterior.spread}
     for solution, weight in zip(posterior.solutions, posterior.weights, strict=True):
-        for source, share in solution_budget(solution, ambiguity, sensor).items():
+        for source, share in solution_budget(solution, rim, sensor).items():
             budget[source] = budget.get(source, 0.0) + weight * share
     return budget
 
 
-def solution_budget(solution: Solution, ambiguity: float, sensor: SensorModel) -> Budget:
-    """Split the uncertainty of a solution by source; `ambiguity` px as in `Rim`."""
+def solution_budget(solution: Solution, rim: Rim, sensor: SensorModel) -> Budget:
+    """Split the uncertainty of a solution by source."""
     budget: Budget = {}
     for block in [*solution.seen, *solution.known]:
         answer = solution.covariance @ block.jacobian.T
         share = (answer @ answer.T)[np.ix_(SHOWN, SHOWN)]
         budget[block.source] = budget.get(block.source, 0.0) + share
-    budget["edge_ambiguity"] = _edge_ambiguity(solution, ambiguity)
+    budget["edge_ambiguity"] = _edge_ambiguity(solution, rim)
     return budget | _sensor_budget(solution, sensor)
 
 
-def two_step_budget(located: Array, solution: Solution, normal_sigma: float, ambiguity: float,
+def two_step_budget(located: Array, solution: Solution, normal_sigma: float, rim: Rim,
                     sensor: SensorModel) -> Budget:
     """Turn the budget of the circle with a held normal into that of the two-step method.
 
@@ -79,7 +81,7 @@ def two_step_budget(located: Array, solution: Solution, normal_sigma: float, amb
         located: x, y, z and the radius (4,) as the two-step method has them, mm.
         solution: what all points together give with that normal.
         normal_sigma: standard deviation of the normal per tangent axis, rad.
-        ambiguity: as in `Rim`, px.
+        rim: the rim that was seen.
         sensor: the sensor.
     """
     circle, plane = solution.circle, sensor.light_plane
@@ -89,28 +91,31 @@ def two_step_budget(located: Array, solution: Solution, normal_sigma: float, amb
         normals = circle.normal + normal_sigma * np.stack([-tangent, tangent])
         low, high = two_step_error(plane, circle.centre, normals, circle.radius)
         errors.append((high - low) / 2.0)
-    budget = solution_budget(solution, ambiguity, sensor)
+    budget = solution_budget(solution, rim, sensor)
     del budget["normal_prior"], budget["radius_prior"]
     two_points = np.diag([0.0, 0.0, 0.0, 2.0 * FORM_SIGMA**2])  # all even waves enter
     return budget | {"form": two_points, "method": np.asarray(np.transpose(errors) @ errors)}
 
 
-def one_sided(ambiguity: float) -> float:
+def one_sided(rim: Rim) -> float:
     """Say by how much (px, standard) an ambiguous edge displaces a rim; the radius, by twice that.
 
-    From rendered scenes: little of a small ambiguity does, for it goes round the rim.
+    From rendered scenes: little of a small ambiguity does, for it goes round the rim. Where much of
+    the rim is missing, something that is not understood hides it.
     """
-    return ambiguity * float(np.interp(ambiguity, AMBIGUITY, SHARE))
+    hidden = max(0.0, COMPLETE - rim.quality.get("coverage", 1.0))
+    aside = rim.ambiguity * float(np.interp(rim.ambiguity, AMBIGUITY, SHARE))
+    return float(np.hypot(aside, HIDING * hidden))
 
 
-def _edge_ambiguity(solution: Solution, ambiguity: float) -> Array:
+def _edge_ambiguity(solution: Solution, rim: Rim) -> Array:
     """Let the seen edge lie beside the bore's all round, and more so on one side."""
-    rim = solution.seen[0]
-    toward = rim.rows.toward
-    aside = one_sided(ambiguity)
+    points = solution.seen[0]
+    toward = points.rows.toward
+    aside = one_sided(rim)
     sigma = np.hypot([2.0 * aside, aside, aside], [RADIUS_DOUBT, CENTRE_DOUBT, CENTRE_DOUBT])
     causes = np.column_stack([np.ones(len(toward)), toward]) * sigma
-    return _spread(solution.response(rim, causes), np.eye(3))
+    return _spread(solution.response(points, causes), np.eye(3))
 
 
 def _sensor_budget(solution: Solution, sensor: SensorModel) -> Budget:
