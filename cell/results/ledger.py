@@ -115,7 +115,7 @@ class Ledger:
 
     def repeat_to_mirror(self) -> None:
         """Hand the mirror every entry again: some may have been lost with a killed program."""
-        for table in LEDGER:
+        for table in LEDGER if self.mirror else ():
             for row in self.rows(table):
                 self._tell_mirror(table, row)
 

@@ -90,6 +90,7 @@ def run_shift(request: ShiftRequest, show: Callable[[Board], None],
         line = _open_line(document, request, station, tell, closing)
         clock = WatchedClock()
         ledger = Ledger(database, document.cell, document.name, books.mirror)
+        ledger.repeat_to_mirror()
         desk = Desk(document, line, ledger, clock, show)
         live = closing.enter_context(LiveView()) if request.live else None
         cell = StationCell(station, jobs, request.logs, live)

@@ -1,5 +1,6 @@
 """A shift over a recorded cell, a line that remembers, and a database of its own."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -7,6 +8,7 @@ from made_cell import RecordedCell, made_job
 from made_line import RememberingLine
 
 from cell.core.documents.shift import BodyType, ShiftDocument
+from cell.programs.shift.books import Books
 from cell.programs.shift.clock import WatchedClock
 from cell.programs.shift.desk import Desk
 from cell.programs.shift.machine import Shift
@@ -15,7 +17,6 @@ from cell.results.database import open_database
 from cell.results.ledger import Ledger
 from cell.results.query import Filter, list_bodies
 from cell.results.tables import faults, notices, visits
-from cell.results.writer import Writer
 
 
 class MadeShift:
@@ -27,7 +28,7 @@ class MadeShift:
                                       bodies=(BodyType(type=1, job="demo.yaml"),))
         self.cell = RecordedCell({"demo.yaml": made_job(), "master.yaml": made_job("master")})
         self.line, self.clock, self.boards = RememberingLine(), WatchedClock(), []
-        self.approved = False
+        self.approved, self.plant, self.patience = False, None, 30.0
         self.database = open_database(folder / "results.sqlite")
         self.ledger = Ledger(self.database, "recorded", "early")
         self.archive = SimpleNamespace(approved=lambda hashes: self.approved, booked=self.booked)
@@ -38,11 +39,12 @@ class MadeShift:
     def run(self, *orders, bodies=None):
         """Run the shift on these orders, one after the other, then stop."""
         self.line.orders = list(orders)
-        books = Writer(self.database)
-        desk = Desk(self.document, self.line, self.ledger, self.clock, self.boards.append)
-        self.shift = Shift(desk, self.cell, Measuring(desk, self.cell, books), self.archive)
-        self.shift.run(bodies)
-        assert books.close()
+        with Books(self.database, self.plant, self.folder) as books:
+            ledger = replace(self.ledger, mirror=books.mirror)
+            desk = Desk(self.document, self.line, ledger, self.clock, self.boards.append)
+            self.shift = Shift(desk, self.cell, Measuring(desk, self.cell, books), self.archive)
+            self.shift.run(bodies)
+            self.settled = books.settle(self.patience)
         return self
 
     def booked(self, recording_id):
