@@ -25,6 +25,12 @@ def test_data(name: str) -> Path:
     return folder
 
 
+@pytest.fixture(scope="session", name="test_data")
+def _test_data() -> Path:
+    """The folder of the test data, for tests that use several of its parts."""
+    return test_data("")
+
+
 @dataclass(frozen=True)
 class DemoRun:
     """One run of jobs/demo.yaml on the virtual cell, ten times faster than real time."""

@@ -18,6 +18,7 @@ from cell.metrology.ellipse import Ellipse
 from cell.metrology.features import Expected, Rim
 from cell.metrology.find_holes import Hole, find_holes
 from cell.metrology.gates import (
+    COMPLETE,
     check_clear,
     check_inside,
     check_lit,
@@ -47,7 +48,11 @@ def detect_hole(image: Image, camera: CameraModel, expected: Expected) -> Rim:
         UnmeasurableError: there is none, or it is cut by the border, covered or not round.
     """
     check_lit(image)
-    holes = list(find_holes(image, camera, expected))
+    holes: list[Hole] = []
+    for hole in find_holes(image, camera, expected):
+        holes.append(hole)
+        if expected.radius is not None and hole.coverage > COMPLETE:
+            break  # the size is right and nothing is missing
     if not holes:
         raise refusal("no_hole")
     best = max(holes, key=lambda hole: hole.coverage * hole.contrast**0.5)

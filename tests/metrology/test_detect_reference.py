@@ -5,9 +5,9 @@ import json
 import cv2
 import numpy as np
 import pytest
-import yaml
 
 from cell.core.documents.calibration import SensorDocument
+from cell.core.documents.text import parse
 from cell.core.errors import UnmeasurableError
 from cell.metrology.detect_pair import detect_pair
 from cell.metrology.features import Expected
@@ -18,7 +18,7 @@ FREE = 0.1  # px of centre error where the edge is not ambiguous
 def read(folder, sensor_file):
     images = [cv2.imread(str(folder / name), cv2.IMREAD_GRAYSCALE)
               for name in ("hole.png", "stripe.png")]
-    sensor = SensorDocument.model_validate(yaml.safe_load(sensor_file.read_text())).model
+    sensor = parse(SensorDocument, sensor_file.read_text(), str(sensor_file)).model
     return images, sensor, json.loads((folder / "truth.json").read_text())
 
 
