@@ -1,6 +1,12 @@
-"""What the hand-eye solver is worth: point error over 40 seeds, and how long 50 views take."""
+"""What calibrating is worth: hand-eye over 40 seeds, 50 views in time, and the whole chain."""
 
+import json
+import re
+import shutil
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +17,7 @@ from cell.metrology.hand_eye_start import solve_park
 
 pytestmark = [pytest.mark.bench, pytest.mark.timeout(900)]
 SEEDS = 40
+ROOT = Path(__file__).parents[2]
 
 
 def rms(values):
@@ -52,3 +59,51 @@ def test_fifty_views_in_a_second_of_one_core():
     spent = time.process_time() - begun
     print(f"\n50 views: {1000 * spent:.0f} ms")
     assert spent < 1.0
+
+
+@pytest.mark.parametrize("arm", ["ideal", "default"])
+def test_the_whole_chain_on_the_virtual_cell(arm, tmp_path):
+    """Camera, light plane, hand-eye and body from nothing, then a body measured against the truth.
+    """
+    for name in ("jobs", "calibration"):
+        shutil.copytree(ROOT / name, tmp_path / name)
+    if arm == "ideal":
+        make_arm_ideal(tmp_path / "calibration" / "demo" / "scene.yaml")
+    (tmp_path / "plan.yaml").write_text("reason: the bench accepts warnings\n")
+    call(tmp_path, "calibrate", "all", "--plan", "plan.yaml", "--yes", "--speed", "10")
+    call(tmp_path, "calibrate", "body", "jobs/demo.yaml", "--yes", "--speed", "10",
+         "--reason", "the bench")
+    answer = json.loads(call(tmp_path, "run", "jobs/demo.yaml", "--speed", "10", "--truth",
+                             "truth.json", "--json", good=(0, 1)))
+    off, sigma = deviations(answer, json.loads((tmp_path / "truth.json").read_text()))
+    print(f"\n{arm} arm: mean {off.mean(axis=0).round(4)}, sd {off.std(axis=0).round(4)}, "
+          f"largest {np.abs(off).max(axis=0).round(3)} mm of {len(off)} holes")
+    assert len(off) >= 20
+    assert np.mean(np.abs(off) <= 2.0 * sigma) >= 0.9
+    if arm == "ideal":
+        assert np.abs(off.mean(axis=0)).max() < 0.05
+
+
+def make_arm_ideal(scene):
+    text = scene.read_text()
+    for key in ("length_mm", "angle_deg", "hysteresis_deg", "repeatability_deg", "sway_deg",
+                "cold_mm"):
+        text, found = re.subn(rf"^(  {key}:) .*$", r"\1 0.0", text, flags=re.MULTILINE)
+        assert found == 1, key
+    scene.write_text(text)
+
+
+def call(folder, *words, good=(0,)):
+    done = subprocess.run([sys.executable, "-m", "cell", *words], cwd=folder, text=True,
+                          capture_output=True, check=False, timeout=600)
+    assert done.returncode in good, done.stderr[-2000:]
+    return done.stdout
+
+
+def deviations(answer, truth):
+    centres = {hole["id"]: hole["centre_mm"] for hole in truth["holes"]}
+    seen = [feature for feature in answer["features"] if feature["measured_mm"]]
+    off = [[feature["measured_mm"][axis] - centre for axis, centre in
+            zip("xyz", centres[feature["id"]], strict=True)] for feature in seen]
+    sigma = [[feature["uncertainty_mm"][axis] for axis in "xyz"] for feature in seen]
+    return np.array(off), np.array(sigma)
