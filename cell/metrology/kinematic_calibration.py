@@ -41,11 +41,16 @@ class Priors:
 
 @dataclass(frozen=True, eq=False)
 class JointView:
-    """One view: the joints (6,) as read, the board as seen, and which board it was."""
+    """One view: the joints (6,) as read, the board as seen, and which board it was.
+
+    `base_from_reported` is the flange as the controller reports it, with whatever its factory
+    calibration put into it; None where that is what the arm's rows say.
+    """
 
     joints: tuple[float, ...]
     board: BoardPose
     board_id: str = "board"
+    base_from_reported: Transform | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +78,8 @@ def solve_kinematics(views: Sequence[JointView], arm: Arm, flange_from_camera: T
 
     Args:
         views: of one board or more; boards in several places tell more.
-        arm: the rows that the controller reckons with.
+        arm: the published rows; the residuals are put onto the poses as reported, as measuring
+            does (`correct_flange`), so that a factory calibration is not counted twice.
         flange_from_camera: the start.
         priors: how far the rows may be off.
         noise: of a reached pose once the residuals are known: repeatability alone.
@@ -112,7 +118,9 @@ class _Fit:
         self.seen = stack(view.board.camera_from_board for view in views)
         self.boards = sorted({view.board_id for view in views})
         self.which = np.array([self.boards.index(view.board_id) for view in views])
-        chain = arm.flanges(self.joints) @ flange_from_camera.matrix @ self.seen
+        self.factory = stack(view.base_from_reported or arm.forward(view.joints)
+                             for view in views) @ inverse(arm.flanges(self.joints))
+        chain = self._flanges(arm) @ flange_from_camera.matrix @ self.seen
         self.places = [Transform(chain[np.flatnonzero(self.which == index)[0]])
                        for index in range(len(self.boards))]
         self.roots = self._roots(views, noise)
@@ -127,9 +135,13 @@ class _Fit:
         arm, camera = with_rows(self.arm, step[:ROWS]), nudge(self.camera, step[ROWS:ROWS + 6])
         nudges = step[ROWS + 6:].reshape(-1, 6)
         places = stack(map(nudge, self.places, nudges))[self.which]
-        misses = small(inverse(places) @ arm.flanges(self.joints) @ camera.matrix @ self.seen)
+        misses = small(inverse(places) @ self._flanges(arm) @ camera.matrix @ self.seen)
         white = np.linalg.solve(self.roots, misses[..., None])
         return np.concatenate([white.ravel(), unknown[:ROWS]])
+
+    def _flanges(self, arm: Arm) -> Array:
+        """The poses (n, 4, 4) as reported, put right by what `arm` differs from the published."""
+        return np.asarray(self.factory @ arm.flanges(self.joints))
 
     def _roots(self, views: Sequence[JointView], noise: RobotNoise) -> Array:
         flange_from_board = self.camera.matrix @ self.seen
