@@ -20,13 +20,16 @@ from cell.metrology.error_model import chord_midpoint_error
 from cell.metrology.features import Rim, Stripe
 from cell.metrology.joint_rows import Circle
 
+X_AXIS = np.array([1.0, 0.0, 0.0])
 ROUND = np.linspace(0.0, 2.0 * np.pi, 73)
 
 
 def trace_circle(circle: Circle, rim: Rim, stripe: Stripe, sensor: SensorModel) -> dict[str, Array]:
     """Draw a circle of the camera frame, its centre, and the chord that the light plane cuts."""
     centre, normal, radius = circle.centre, circle.normal, circle.radius
-    first, second = np.linalg.svd(normal[None, :])[2][1:]
+    first = X_AXIS - normal[0] * normal  # what the camera sees never faces along its x
+    first = first / np.linalg.norm(first)
+    second = np.cross(normal, first)
     round_it = centre + radius * (np.cos(ROUND)[:, None] * first + np.sin(ROUND)[:, None] * second)
     points = {"centre": centre, **_chord(centre, normal, radius, sensor.light_plane)}
     return {"rim": rim.points, "stripe": stripe.points, "ellipse": sensor.camera.project(round_it),
