@@ -83,6 +83,9 @@ class RecordedCell:
             return ""
         return read_seal(seal_path(self.folder / f"{recording_id}.rrd")).chain
 
+    def go_home(self):
+        self.plant(0, "start")
+
     def make_safe(self):
         self.safe += 1
 

@@ -23,7 +23,7 @@ class Desk:
     def __init__(self, document: ShiftDocument, line: Line, ledger: Ledger, clock: WatchedClock,
                  show: Callable[[Board], None]) -> None:
         self.document, self.line, self.ledger, self.clock = document, line, ledger, clock
-        self.board = Board(document.name)
+        self.board = Board(document.name, clear=False)
         self.bypass: Row | None = ledger.current_bypass()
         self.stopping = self.interrupted = False
         self._show = show

@@ -14,8 +14,10 @@ from collections.abc import Callable, Collection
 from typing import Protocol
 
 from cell.core.documents.result import BodyVerdict
+from cell.core.errors import DeviceError
 from cell.core.ports import LineResult, LineVerdict, Order, Refusal
 from cell.programs.shift.desk import Desk
+from cell.programs.shift.faults import fault_of
 from cell.programs.shift.master import judge_master
 from cell.programs.shift.measuring import Measuring, Outcome
 from cell.programs.shift.standing import PAUSE, stand
@@ -55,6 +57,7 @@ class Shift:
         """Run until the line or a person says stop, or `bodies` bodies are through."""
         desk = self._desk
         try:
+            self._clear_the_zone()
             self._guarded(self._answer_open_visits)
             while not desk.stopping and (bodies is None or self.done < bodies):
                 self._idle()
@@ -66,6 +69,15 @@ class Shift:
         finally:
             self._cell.make_safe()
             desk.update(state="stopped", instruction="", busy=False)
+
+    def _clear_the_zone(self) -> None:
+        """Drive home first: a killed run may have left the arm in the bodies' way."""
+        while not self._desk.stopping and not self._desk.board.clear:
+            try:
+                self._cell.go_home()
+                self._desk.update(clear=True)
+            except DeviceError as error:
+                stand(self._desk, self._cell, fault_of(error), str(error))
 
     def _guarded(self, step: Callable[..., None], *given: Order) -> None:
         """Take a step; where the ledger fails, stand, and begin again from what it holds."""

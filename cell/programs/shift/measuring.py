@@ -36,13 +36,13 @@ class Measuring:
 
     def __init__(self, desk: Desk, cell: Cell, books: Books) -> None:
         self._desk, self._cell, self._books = desk, cell, books
-        self._guard = TaktGuard(desk.document.takt) if desk.document.takt else None
+        self._takt = TaktGuard(desk.document.takt) if desk.document.takt else None
+        self._guard: TaktGuard | None = None
         self._begun: Begun | None = None
 
     def measure(self, visit: Row, job: PreparedJob) -> tuple[Row, Outcome]:
         """Measure a body and book what came out; the arm may still stand over it afterwards."""
-        if self._guard:
-            self._guard.begin(time.monotonic())
+        self._guard = self._guard_of(visit)
         self._desk.update(state="measuring", busy=True, clear=False, hole=0, holes=len(job.holes),
                           body_id=visit["body_id"], body_type=visit["body_type"], instruction="",
                           trial=visit["trial"])
@@ -64,14 +64,23 @@ class Measuring:
 
     def leave(self, visit: Row) -> None:
         """Drive the arm out of the body's way, however often it takes."""
-        while self._begun is not None and not self._desk.stopping:
+        while self._begun is not None and not self._desk.interrupted:
             try:
                 self._begun.inspection.go_home()
                 self._begun = None
             except DeviceError as error:
                 stand(self._desk, self._cell, fault_of(error), str(error), visit)
+                if self._desk.stopping:
+                    break
         self._desk.update(busy=False, clear=self._begun is None)
         self._begun = None
+
+    def _guard_of(self, visit: Row) -> TaktGuard | None:
+        """Start the takt of a body; a master is measured whole, whatever it takes."""
+        if self._takt is None or visit["kind"] == "master":
+            return None
+        self._takt.begin(time.monotonic())
+        return self._takt
 
     def _begin(self, visit: Row, job: PreparedJob) -> Begun | None:
         while True:

@@ -13,6 +13,7 @@ from cell.core.documents.nominals import Hole
 from cell.core.errors import DocumentError, RecordingError
 from cell.programs.approve import approval_hashes
 from cell.programs.inspection import BodyInspection, Prepared
+from cell.programs.inspection.drive import Driver
 from cell.programs.run import begin
 from cell.programs.shift.work import Begun, PreparedJob
 from cell.programs.station import Station
@@ -44,6 +45,10 @@ class StationCell:
         recorder = Recorder(log, start, self._live)
         inspection = BodyInspection(self._station, prepared, start, recorder, _unwatched)
         return Begun(start, inspection, lambda: _chain_of(log))
+
+    def go_home(self) -> None:
+        """Drive home, as the first stop of any job would begin."""
+        Driver(self._station, next(iter(self._prepared.values()))).go_home()
 
     def make_safe(self) -> None:
         """Lights off, arm at rest."""

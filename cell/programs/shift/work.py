@@ -71,6 +71,9 @@ class Cell(Protocol):
     def begin(self, job: PreparedJob, body_id: str, *, trial: bool) -> Begun:
         """Open the recording of a body. Raises `DocumentError` or `RecordingError`."""
 
+    def go_home(self) -> None:
+        """Drive the arm out of the bodies' way from wherever it stands. Raises `DeviceError`."""
+
     def make_safe(self) -> None:
         """Lights off, arm at rest. Never raises."""
 

@@ -40,7 +40,7 @@ def test_bodies_come_are_measured_and_released(made):
     assert [b["body_id"] for b in made.bodies] == ["A", "B", "C"]
     assert made.bodies[1]["out_of_tolerance"] == 1 and made.line.results[1].worst == \
         pytest.approx(0.9)
-    assert made.states == ["ready", "measuring", "result"] * 3 + ["ready", "stopped"]
+    assert made.states == ["starting", *["ready", "measuring", "result"] * 3, "ready", "stopped"]
     assert all(refusal == "" for _, refusal in made.line.answers) and made.cell.homes == 3
 
 
@@ -84,7 +84,7 @@ def test_a_master_is_due_first_and_again_after_every_so_many(made):
         ("M", "master"), ("A", "body"), ("B", "body"), ("M", "master"), ("C", "body")]
     assert [refusal for _, refusal in made.line.answers].count("master_due") == 2
     assert made.visits[0]["reason"].startswith("master check passed: 0.100 mm")
-    assert made.shift.done == 3 and made.states[0] == "master_due"
+    assert made.shift.done == 3 and made.states[1] == "master_due"
 
 
 def test_a_master_out_of_its_limit_stops_production_until_one_passes(made):
@@ -284,6 +284,22 @@ def test_a_clock_that_is_set_is_noticed(made):
         "less than the last entry" in made.notices[0][1]
 
 
+def test_a_master_is_measured_whole_whatever_the_takt(made):
+    made.cell.jobs["master.yaml"] = made_job("master", importance=lambda n: "minor")
+    made.change(takt=Takt(seconds=0.01, hole_s=1.0, reserve_s=0.0),
+                master=MasterCheck(type=9, job="master.yaml"))
+    made.run(start("M", 9), STOP)
+    assert made.bodies[0]["measured"] == 6 and made.verdicts == [("M", "ok")]
+
+
+def test_the_zone_is_clear_only_after_the_arm_has_come_home(made):
+    made.cell.plant = once(RobotStoppedError("still", state="emergency_stop"), body=0, hole="start")
+    made.run(RESET, start("A"), STOP)
+    before = made.boards[:made.states.index("emergency_stop") + 1]
+    assert not any(board.clear for board in before) and made.verdicts == [("A", "ok")]
+    assert [(f["state"], f["sequence"]) for f in made.faults] == [("emergency_stop", None)]
+
+
 def test_bodies_are_counted(made):
     made.run(start("A"), start("B"), start("C"), bodies=2)
     assert [v["body_id"] for v in made.visits] == ["A", "B"]
@@ -291,7 +307,7 @@ def test_bodies_are_counted(made):
 
 def test_stop_ends_the_shift_after_the_body(made):
     made.run(start("A"), When("measuring", STOP, hole=1), start("B"))
-    assert made.verdicts == [("A", "ok")]
+    assert made.verdicts == [("A", "ok")] and made.cell.homes == 1 and made.boards[-1].clear
 
 
 def test_a_type_may_not_be_named_twice():
