@@ -61,7 +61,7 @@ class Solution:
     @property
     def reasons(self) -> tuple[str, ...]:
         """What speaks against it, step by step."""
-        camera_and_plane = [f"{step}: {gate}" for step in ("camera", "light plane")
+        camera_and_plane = [f"{step}: {gate}" for step in ("camera", "light plane", "laser path")
                             for gate in self.gates.get(step, ()) if gate.verdict != "pass"]
         return (*camera_and_plane, *(() if self.hand_eye is None else self.hand_eye.reasons))
 
@@ -121,7 +121,11 @@ def _solve(views: tuple[SeenView, ...], session: Session, belief: Belief,
     if what in ("hand-eye", "all"):
         answer = _hand_eye(views, camera, gates)
         checks["hand-eye"] = answer.gates
-    return Solution(views, camera, camera_result, plane, answer, checks)
+    solution = Solution(views, camera, camera_result, plane, answer, checks)
+    missed = laser_path_rms(solution, belief)
+    if not np.isnan(missed):
+        checks["laser path"] = check_gates({"laser_path_mm": missed}, gates.hand_eye)
+    return solution
 
 
 def _plane(views: Sequence[SeenView], camera: CameraModel) -> LightPlaneResult:
@@ -139,6 +143,25 @@ def _hand_eye(views: Sequence[SeenView], camera: CameraModel, gates: GateSet) ->
     apart = [view.record.number for view in views if view.record.purpose == "hold_out"]
     numbered = session.numbered(tuple(view.record.number for view in views))
     return calibrate_hand_eye(numbered, gates, apart)
+
+
+def laser_path_rms(solution: Solution, belief: Belief) -> float:
+    """Measure the board through the laser, in views that nothing was fitted to: mm off it, rms.
+
+    The stripe goes the way of every measurement: light plane, camera, flange, base; the board is
+    where the hand-eye fit has it. Not a number where there is no such view.
+    """
+    answer = solution.hand_eye
+    if answer is None or answer.held_out is None:
+        return float("nan")
+    plane = solution.light_plane.plane if solution.light_plane else belief.sensor.light_plane
+    result = answer.held_out.result
+    unseen = [view for view in solution.views if view.record.number in answer.apart]
+    heights = [
+        (result.reference_from_board.inverse @ view.record.pose @ result.carrier_from_camera
+         @ plane.meet(solution.camera.rays(view.stripe)))[:, 2]
+        for view in unseen if view.stripe is not None]
+    return float(np.sqrt(np.mean(np.concatenate(heights) ** 2))) if heights else float("nan")
 
 
 def camera_figures(result: CameraResult) -> dict[str, float]:
