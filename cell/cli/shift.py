@@ -116,11 +116,11 @@ def _print_registers() -> None:
 
     for title, table in (("PLC -> cell, holding registers (3, 6, 16)", registers.FROM_PLC),
                          ("cell -> PLC, input registers (4)", registers.FROM_CELL)):
-        answers.print(f"\n{title}", style="bold", highlight=False)
+        answers.print(f"\n{title}", style="bold", highlight=False, soft_wrap=True)
         for one in table:
             span = f"{one.address}" + (f"-{one.address + one.size - 1}" if one.size > 1 else "")
-            answers.print(f"  {span:>6}  {one.name:<18}{one.meaning}", highlight=False)
+            answers.print(f"  {span:>6}  {one.name:<18}{one.meaning}", highlight=False, soft_wrap=True)
     for name in ("COMMANDS", "STATUS", "STATES", "VERDICTS", "REFUSALS", "FAULTS"):
         codes = ", ".join(f"{code} {word}" for word, code in getattr(registers, name).items()
                           if word)
-        answers.print(f"\n{name}: {codes}", highlight=False)
+        answers.print(f"\n{name}: {codes}", highlight=False, soft_wrap=True)
