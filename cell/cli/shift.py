@@ -119,7 +119,8 @@ def _print_registers() -> None:
         answers.print(f"\n{title}", style="bold", highlight=False, soft_wrap=True)
         for one in table:
             span = f"{one.address}" + (f"-{one.address + one.size - 1}" if one.size > 1 else "")
-            answers.print(f"  {span:>6}  {one.name:<18}{one.meaning}", highlight=False, soft_wrap=True)
+            answers.print(f"  {span:>6}  {one.name:<18}{one.meaning}", highlight=False,
+                          soft_wrap=True)
     for name in ("COMMANDS", "STATUS", "STATES", "VERDICTS", "REFUSALS", "FAULTS"):
         codes = ", ".join(f"{code} {word}" for word, code in getattr(registers, name).items()
                           if word)
