@@ -21,6 +21,7 @@ class CalibrationPlan(Document):
 
     `goal_mm` is the predicted uncertainty of a point at which capturing may stop early. `reason`
     is recorded where a warning is accepted; without one, warnings are not accepted unattended.
+    `kinematics` has the arm's own rows estimated too, where views kept apart gain by it.
     """
 
     operator: str = "unattended"
@@ -34,6 +35,7 @@ class CalibrationPlan(Document):
     depth_mm: Positive = 22.0
     aside_mm: NotNegative = 6.0
     gates: Literal["fine", "coarse"] = "fine"
+    kinematics: bool = False
     activate: bool = True
     reason: str = ""
 

@@ -16,8 +16,8 @@ from cell.metrology.pose_planning import predict_point_sigma
 from cell.programs.calibration.belief import Belief, design_of
 from cell.programs.calibration.capture import Shots, as_rows, as_six, drive, record, shoot
 from cell.programs.calibration.poses import free_path
+from cell.programs.calibration.seen import SeenView, see_view
 from cell.programs.calibration.session import Session
-from cell.programs.calibration.solve import SeenView, see_view
 from cell.programs.station import Station
 
 TRIES = 3

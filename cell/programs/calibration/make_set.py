@@ -40,6 +40,8 @@ def make_set(session: Session, solution: Solution, belief: Belief, signature: Si
     shutil.copytree(session.folder, made)
     replace_text(made / "sensor.yaml", dump(sensor_document(solution, belief)))
     replace_text(made / "hand_eye.yaml", dump(hand_eye_document(session, solution, belief)))
+    if solution.kinematics is not None and solution.kinematics.useful:
+        replace_text(made / "kinematics.yaml", dump(solution.kinematics.document))
     replace_text(made / "report.html", calibration_report(page_of(solution, session.header,
                                                                   signature)))
     return write_set(belief.folder, made, signature.at)
@@ -80,10 +82,12 @@ def hand_eye_document(session: Session, solution: Solution, belief: Belief) -> H
     answer = solution.hand_eye
     if answer is None or answer.held_out is None:
         return belief.hand_eye
-    result = answer.held_out.result
+    result, mount = answer.held_out.result, answer.held_out.result.carrier_from_camera
+    if solution.kinematics is not None and solution.kinematics.useful:
+        mount = solution.kinematics.result.flange_from_camera
     still = answer.figures["object_rms_mm"] / np.sqrt(3.0)
     return belief.hand_eye.model_copy(update={
-        "flange_from_camera": as_rows(result.carrier_from_camera),
+        "flange_from_camera": as_rows(mount),
         "robot": session.header.robot,
         "sensor_serial": session.header.sensor_serial,
         "covariance": _rows(result.covariance[:6, :6]),

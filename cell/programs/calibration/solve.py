@@ -7,34 +7,22 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cell.core.documents.calibration_session import ViewRecord
 from cell.core.errors import DocumentError, UnmeasurableError
-from cell.core.geometry import Array
-from cell.core.observation import Image
 from cell.core.optics import CameraModel
-from cell.metrology.board_pose import BoardView, locate_boards
+from cell.metrology.board_pose import locate_boards
 from cell.metrology.calibration_gates import Checked, GateSet, Ruling, check_gates, worst
 from cell.metrology.camera_calibration import TILTED, CameraResult, solve_camera
-from cell.metrology.detect_board import BoardDesign, detect_board
-from cell.metrology.detect_board_stripe import detect_board_stripe
 from cell.metrology.hand_eye_calibration import HandEyeAnswer, calibrate_hand_eye
 from cell.metrology.hand_eye_session import HandEyeSession
 from cell.metrology.light_plane import LightPlaneResult, StripeOnBoard, solve_light_plane
 from cell.metrology.motions import stack
 from cell.programs.calibration.belief import Belief, design_of
+from cell.programs.calibration.kinematics import KinematicsFound, find_kinematics
 from cell.programs.calibration.recorded import read_gates
+from cell.programs.calibration.seen import SeenView, see_view
 from cell.programs.calibration.session import Session
 
 DEPTH = 44.0  # mm over which a light plane should have been seen: the depth of field
-
-
-@dataclass(frozen=True, eq=False)
-class SeenView:
-    """One view of a session as detection sees it; no stripe where none was found."""
-
-    record: ViewRecord
-    board: BoardView
-    stripe: Array | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +37,7 @@ class Solution:
     camera_result: CameraResult | None = None
     light_plane: LightPlaneResult | None = None
     hand_eye: HandEyeAnswer | None = None
+    kinematics: KinematicsFound | None = None
     gates: dict[str, tuple[Checked, ...]] = field(default_factory=dict)
 
     @property
@@ -90,21 +79,6 @@ def see_views(session: Session, belief: Belief) -> tuple[SeenView, ...]:
                  if view.status == "ok" and view.purpose in ("fit", "hold_out"))
 
 
-def see_view(record: ViewRecord, ring: Image, stripe: Image, belief: Belief,
-             design: BoardDesign) -> SeenView:
-    """Detect board and stripe in the two pictures of a view.
-
-    Raises:
-        UnmeasurableError: no board.
-    """
-    board = detect_board(ring, design).view
-    try:
-        points = detect_board_stripe(stripe, ring, belief.sensor.camera, upright=belief.upright)
-    except UnmeasurableError:
-        return SeenView(record, board, None)
-    return SeenView(record, board, points)
-
-
 def _solve(views: tuple[SeenView, ...], session: Session, belief: Belief,
            gates: GateSet) -> Solution:
     what = session.header.what
@@ -121,7 +95,9 @@ def _solve(views: tuple[SeenView, ...], session: Session, belief: Belief,
     if what in ("hand-eye", "all"):
         answer = _hand_eye(views, camera, gates)
         checks["hand-eye"] = answer.gates
-    solution = Solution(views, camera, camera_result, plane, answer, checks)
+    found = (find_kinematics(views, camera, answer, belief)
+             if session.header.plan.kinematics and answer else None)
+    solution = Solution(views, camera, camera_result, plane, answer, found, checks)
     missed = laser_path_rms(solution, belief)
     if not np.isnan(missed):
         checks["laser path"] = check_gates({"laser_path_mm": missed}, gates.hand_eye)

@@ -104,6 +104,11 @@ def show(solution: Solution, operator: Operator) -> None:
         operator.tell(f"- {reason}")
     if solution.hand_eye is not None and solution.hand_eye.limited_by:
         operator.tell(solution.hand_eye.limited_by)
+    if solution.kinematics is not None:
+        found = solution.kinematics
+        operator.tell(f"kinematics: views kept apart {found.apart_without:.3f} mm without, "
+                      f"{found.apart_with:.3f} mm with the arm's own rows: "
+                      f"{'kept' if found.useful else 'not kept'}")
     operator.tell(f"verdict: {solution.verdict}")
 
 

@@ -1,0 +1,38 @@
+"""One view of a session as detection sees it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cell.core.documents.calibration_session import ViewRecord
+from cell.core.errors import UnmeasurableError
+from cell.core.geometry import Array
+from cell.core.observation import Image
+from cell.metrology.board_pose import BoardView
+from cell.metrology.detect_board import BoardDesign, detect_board
+from cell.metrology.detect_board_stripe import detect_board_stripe
+from cell.programs.calibration.belief import Belief
+
+
+@dataclass(frozen=True, eq=False)
+class SeenView:
+    """What a view shows: the board's corners, and the stripe (n, 2) px where one was found."""
+
+    record: ViewRecord
+    board: BoardView
+    stripe: Array | None
+
+
+def see_view(record: ViewRecord, ring: Image, stripe: Image, belief: Belief,
+             design: BoardDesign) -> SeenView:
+    """Detect board and stripe in the two pictures of a view.
+
+    Raises:
+        UnmeasurableError: no board.
+    """
+    board = detect_board(ring, design).view
+    try:
+        points = detect_board_stripe(stripe, ring, belief.sensor.camera, upright=belief.upright)
+    except UnmeasurableError:
+        return SeenView(record, board, None)
+    return SeenView(record, board, points)
