@@ -31,10 +31,10 @@ from cell.metrology.motions import (
     nearest_rotation,
     nudge,
     nudge_as_motion,
-    point_shift,
     small,
     stack,
 )
+from cell.metrology.working_volume import point_sigma
 
 Mount: TypeAlias = Literal["flange", "static"]
 
@@ -43,9 +43,6 @@ FEWEST_VIEWS = 6         # below that nothing is solved
 ROBUST_FROM = 2.5        # standard deviations: from there the loss grows more slowly
 OUTLIER_RATIO = 4.0      # of a view's misfit to the median
 MOST_DROPPED = 0.2       # of the views
-VOLUME: Array = np.array([[x, y, z] for x in (-40.0, 0.0, 40.0) for y in (-30.0, 0.0, 30.0)
-                   for z in (-20.0, 0.0, 20.0)])
-"""The working volume (mm) about the point on the optic axis at the working distance."""
 
 
 @dataclass(frozen=True)
@@ -156,19 +153,6 @@ def residuals_of(problem: HandEyeProblem, carrier_from_camera: Transform,
     """Form the small motions (n, 6) in the board frame that separate each view from the rest."""
     return small(inverse(reference_from_board.matrix) @ problem.reference_from_carrier
                  @ carrier_from_camera.matrix @ problem.camera_from_board)
-
-
-def point_sigma(covariance: Array, carrier_from_camera: Transform,
-                working_distance: float) -> float:
-    """Carry a nudge's covariance (6, 6) to the working volume: mm, rms in 3D."""
-    jacobian = volume_shift(carrier_from_camera, working_distance)
-    return float(np.sqrt(np.einsum("nij,jk,nik->", jacobian, covariance, jacobian) / len(VOLUME)))
-
-
-def volume_shift(carrier_from_camera: Transform, working_distance: float) -> Array:
-    """Build (n, 3, 6): how the points of the working volume move with a nudge of the camera."""
-    in_camera = VOLUME + np.array([0.0, 0.0, working_distance])
-    return point_shift(carrier_from_camera.turn(in_camera))
 
 
 def whiten(roots: Array, columns: Array) -> Array:

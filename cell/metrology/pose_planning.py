@@ -9,13 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from cell.core.geometry import Array, Transform
-from cell.metrology.hand_eye import (
-    UNKNOWNS,
-    HandEyeProblem,
-    point_sigma,
-    view_information,
-    volume_shift,
-)
+from cell.metrology.hand_eye import UNKNOWNS, HandEyeProblem, view_information
+from cell.metrology.working_volume import point_sigma, volume_shift
 
 BELIEF = np.repeat([np.radians(10.0), 20.0], 3)
 """What a drawing tells of the camera's mount: standard uncertainty, three rad, three mm."""
