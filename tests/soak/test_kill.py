@@ -129,12 +129,12 @@ def _kill_again_and_again(logs, times, seed):
 
 
 def _let_it_end(logs, port, plc):
-    """Start once more, let a few bodies through, and stop as the line stops a shift."""
+    """Start once more, let a body through, and stop as the line stops a shift."""
     cell = _start(logs, port)
     try:
         _answers(port)
         done, deadline = len(plc.acknowledged), time.monotonic() + 60
-        while len(plc.acknowledged) < done + 3 and time.monotonic() < deadline:
+        while len(plc.acknowledged) < done + 2 and time.monotonic() < deadline:
             time.sleep(0.05)
         plc.ending.set()
         plc.thread.join(20)
