@@ -6,6 +6,8 @@ hole, wall and sheet, with the wall that thickness and tilt predict.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from cell.core.geometry import Array
@@ -30,7 +32,7 @@ from cell.metrology.profile_fit import fit_profile, locate_edges
 from cell.metrology.reasons import refusal
 from cell.metrology.rim_fit import agree, settle
 from cell.metrology.spread import correlation_length, robust_sigma
-from cell.metrology.wall import lit, predict_wall, suspect_walls
+from cell.metrology.wall import doubt_of_wall, is_known, lit, predict_wall, suspect_walls
 
 WIDE = 8.0             # px to either side, where edges are looked for first
 OUTWARD = 3.0          # px of sheet in a grey profile: more would add its texture
@@ -38,6 +40,7 @@ INWARD = 3.0           # px of hole beyond the wall
 MANY = 0.87            # profiles an edge, below which two rims may show
 ROUGH_SPACING, SPACING = 3.0, 1.5  # px along the rim
 SHARP = 1.0            # px of blur by the lens, above which the edge itself may be rounded
+LIT_DOUBT, DARK_DOUBT = 0.5, 0.25  # of what a wall draws the edge by: a dark one is like another
 SMALL_ROUGHNESS = 0.25  # px from end to end, which texture alone gives
 
 
@@ -68,8 +71,8 @@ def detect_rim(image: Image, hole: Hole, camera: CameraModel, expected: Expected
     check_whole(image, hole)
     check_inside(image, hole.ellipse)
     rough, seen, doubled = _rough_rim(hole)
-    walls = [predict_wall(rough, hole.inside, camera, expected)]
-    known = expected.normal is not None and expected.thickness is not None
+    walls = [predict_wall(rough, hole, camera, expected)]
+    known = is_known(expected)
     walls += [lit(walls[0])] if known or not doubled else suspect_walls(walls[0])
     band = _profiles(hole.patch, rough, max(wall.widest for wall in walls))
     rays = np.repeat(seen, -(-len(band.t) // len(seen)))[:len(band.t)]
@@ -78,7 +81,9 @@ def detect_rim(image: Image, hole: Hole, camera: CameraModel, expected: Expected
     step = abs(float(np.median(height[rays])))
     check_clear(step, float(np.median(misfit[rays])), profile.blur)
     good = rays & (misfit < 3.0 * np.median(misfit[rays])) & (np.abs(edge - profile.edge) < 2.0)
-    return _rim(band, edge, good, profile, hole)
+    rim = _rim(band, edge, good, profile, hole)
+    doubt = 0.0 if known else doubt_of_wall(walls[0], profile)
+    return replace(rim, ambiguity=rim.ambiguity + doubt)
 
 
 def _rough_rim(hole: Hole) -> tuple[Ellipse, Mask, bool]:
@@ -127,8 +132,9 @@ def _ambiguity(ripple: Array, profile: Profile) -> float:
     """
     low, high = np.quantile(ripple, [0.025, 0.975])
     soft = np.sqrt(max(profile.blur**2 - SMOOTHING**2, 0.0)) - SHARP
-    return float(max(high - low - SMALL_ROUGHNESS, 0.0) + np.clip(3.0 * soft, 0.0, 1.5)
-                 + np.abs(profile.wall_pull).max() / 2.0)
+    pull = profile.wall_pull
+    drawn = max(LIT_DOUBT * float(pull.max()), -DARK_DOUBT * float(pull.min()))
+    return float(max(high - low - SMALL_ROUGHNESS, 0.0) + np.clip(3.0 * soft, 0.0, 1.5) + drawn)
 
 
 def _quality(hole: Hole, profile: Profile, good: Mask) -> dict[str, float]:

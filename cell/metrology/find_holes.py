@@ -28,14 +28,15 @@ EDGE_WIDTH = 2.5        # px over which the step of a sharp edge extends
 @dataclass(frozen=True, eq=False)
 class Hole:
     """A hole as the search knows it: a rough `ellipse`, `inside` (-1 darker, +1 brighter than the
-    metal), the share of its rim that was seen (`coverage`), the `contrast` there (grey/px) and the
-    `patch` of the image around it.
+    metal), the share of its rim that was seen (`coverage`), the `contrast` there (grey/px), the
+    `glow` (the grey inside as a share of the metal's) and the `patch` of the image around it.
     """
 
     ellipse: Ellipse
     inside: int
     coverage: float
     contrast: float
+    glow: float
     patch: Patch
 
 
@@ -97,7 +98,8 @@ def _look(image: Image, circle: Circle, expected: Expected, camera: CameraModel)
     rise = float(np.median(circle.inside * (inner - outer)[seen]))
     if rise < 0.3 * EDGE_WIDTH * contrast:  # a line, not a step: scratch, groove, glint
         return None
-    return Hole(ellipse, circle.inside, float(seen.mean()), contrast, patch)
+    glow = float(np.median(inner[seen]) / max(float(np.median(outer[seen])), 1e-3))
+    return Hole(ellipse, circle.inside, float(seen.mean()), contrast, glow, patch)
 
 
 def within(image: Image, ellipse: Ellipse, rays: int) -> Mask:

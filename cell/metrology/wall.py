@@ -15,12 +15,16 @@ from cell.core.geometry import Array
 from cell.core.optics import CameraModel
 from cell.metrology.ellipse import Ellipse, project_circle
 from cell.metrology.features import Expected
+from cell.metrology.find_holes import Hole
+from cell.metrology.profile import Profile
 
 USUAL_THICKNESS = 1.2   # mm
 USUAL_DISTANCE = 250.0  # mm
 SUSPECTED = 3.5         # px, the shift of a far rim that shows without having been predicted
 LITTLE, MUCH = 0.98, 0.85      # of the misfit: evidence for a wall that was expected, or not
 HARDLY, BRIGHTLY = 0.02, 0.25  # share, of the step from hole to sheet, that walls take or do not
+WALL_GREY = 0.08        # of the sheet's: a wall that the light passes along is nearly black
+BROAD, BROAD_DOUBT = 2.0, 0.3  # px of wall, and what share of the rest is doubted
 USUAL_TILT = 0.06       # rad, the standard deviation of a tilt that nothing is known of
 
 
@@ -49,10 +53,11 @@ class Wall:
         return self.shrink - normals @ self.shift
 
 
-def predict_wall(rim: Ellipse, inside: int, camera: CameraModel, expected: Expected) -> Wall:
+def predict_wall(rim: Ellipse, hole: Hole, camera: CameraModel, expected: Expected) -> Wall:
     """Predict the visible wall from thickness, tilt and distance, as far as they are known.
 
-    Under a bright opening (`inside` +1) the wall is as dark as the sheet, or darker.
+    Before something lit the wall is a dark ring, too narrow to be seen by itself as a rule. Under
+    an opening brighter than the sheet the wall is as dark as the sheet, or darker.
     """
     ray = camera.rays(rim.centre)
     depth = float(expected.centre[2]) if expected.centre is not None else USUAL_DISTANCE
@@ -62,11 +67,25 @@ def predict_wall(rim: Ellipse, inside: int, camera: CameraModel, expected: Expec
     scale = float(camera.matrix[0, 0]) / depth
     near = project_circle(camera, depth * ray, normal, rim.radius / scale)
     far = project_circle(camera, depth * ray - thickness * normal, normal, rim.radius / scale)
-    known = expected.thickness is not None and expected.normal is not None
+    known = is_known(expected)
     unsure = expected.normal_sigma if known else USUAL_TILT
-    share = 0.0 if inside < 0 else 1.0
+    share, share_sigma = 1.0, BRIGHTLY if known else HARDLY
+    if hole.inside < 0:
+        share = min(0.0, (WALL_GREY - hole.glow) / (1.0 - hole.glow))
+        share_sigma = HARDLY - BRIGHTLY * share
     return Wall(far.centre - near.centre, 0.05 + thickness * unsure * scale,
-                near.radius - far.radius, share, HARDLY if inside < 0 or not known else BRIGHTLY)
+                near.radius - far.radius, share, share_sigma)
+
+
+def is_known(expected: Expected) -> bool:
+    """Tell whether enough is known of a sheet to predict how wide the wall shows."""
+    return expected.thickness is not None and expected.normal is not None
+
+
+def doubt_of_wall(wall: Wall, profile: Profile) -> float:
+    """Say how far (px) a wall may have drawn the rim where nobody could predict its width."""
+    broad = max(float(profile.width.max()) - BROAD, 0.0)
+    return abs(wall.share) * wall.sigma + BROAD_DOUBT * broad
 
 
 def lit(wall: Wall) -> Wall:
