@@ -16,18 +16,30 @@ def read_text(path: Path) -> str:
     Raises:
         DocumentError: absent, a folder, not readable, too large, or not UTF-8 text.
     """
+    content = read_bytes(path, LARGEST)
     try:
-        if path.stat().st_size > LARGEST:
-            raise DocumentError(f"expected at most {LARGEST // 10**6} MB of text", source=str(path))
-        return path.read_bytes().decode("utf-8")
-    except FileNotFoundError:
-        raise DocumentError("there is no such file", source=str(path)) from None
+        return content.decode("utf-8")
     except UnicodeDecodeError as error:
-        line = path.read_bytes()[:error.start].count(b"\n") + 1
+        line = content[:error.start].count(b"\n") + 1
         raise DocumentError("expected UTF-8 text; came other bytes", source=str(path),
                             place=f"line {line}") from None
+
+
+def read_bytes(path: Path, most: int) -> bytes:
+    """Read a file of at most so many bytes; DocumentError where it is absent, unreadable, larger.
+
+    What has no end, such as a device, is not read to its end either.
+    """
+    try:
+        with path.open("rb") as file:
+            content = file.read(most + 1)
+    except FileNotFoundError:
+        raise DocumentError("there is no such file", source=str(path)) from None
     except OSError as error:
         raise DocumentError(f"cannot be read: {error.strerror}", source=str(path)) from None
+    if len(content) > most:
+        raise DocumentError(f"expected at most {most // 10**6} MB", source=str(path))
+    return content
 
 
 def replace_text(path: Path, text: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import traceback
+from contextlib import suppress
 from typing import Any
 
 import typer
@@ -40,7 +41,8 @@ app = typer.Typer(
 )
 
 WRONG_WORDS: Any = typer.BadParameter.__mro__[2]  # the base of usage errors, wherever click lives
-REASONS = {2: "bad_input", 3: "device_fault", 4: "recording_failed"}
+REASONS = {2: "bad_input", 3: "device_fault", 4: "recording_failed", BUG: "program_fault",
+           INTERRUPTED: "interrupted"}
 
 app.command()(run)
 app.add_typer(calibrate)
@@ -80,20 +82,22 @@ def _run() -> int:
         return leave.exit_code
     except (KeyboardInterrupt, typer.Abort):
         console.print("interrupted", style="yellow")
-        return INTERRUPTED
+        return _fail(INTERRUPTED, "interrupted")
     except WRONG_WORDS as wrong:
         wrong.show()
-        return wrong.exit_code
+        return _fail(wrong.exit_code, wrong.format_message())
     except CellError as error:
-        return _explain(error)
-    except Exception:  # noqa: BLE001  a bug must never end with a code that reads as a verdict
+        console.print(f"[red]error:[/red] {escape(str(error))}", highlight=False, soft_wrap=True)
+        return _fail(error.exit_code, str(error))
+    except Exception as bug:  # noqa: BLE001  must never end with a code that reads as a verdict
         traceback.print_exc()
         console.print("This is a fault of the program, not of your input.", style="red")
-        return BUG
+        return _fail(BUG, repr(bug))
 
 
-def _explain(error: CellError) -> int:
+def _fail(code: int, detail: str) -> int:
+    """Give the caller of `--json` its one object, also now; return the exit code."""
     if "--json" in sys.argv:
-        print_json({"ok": False, "reason": REASONS[error.exit_code], "detail": str(error)})
-    console.print(f"[red]error:[/red] {escape(str(error))}", highlight=False, soft_wrap=True)
-    return error.exit_code
+        with suppress(OSError):  # the caller may be gone
+            print_json({"ok": False, "reason": REASONS[code], "detail": detail})
+    return code

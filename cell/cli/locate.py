@@ -13,6 +13,7 @@ from cell.cli.words import answers, console, print_json
 from cell.core.errors import DocumentError, UnmeasurableError
 
 if TYPE_CHECKING:
+    from cell.core.documents.calibration import SensorDocument
     from cell.core.documents.result import Located
     from cell.core.observation import Image
     from cell.metrology.features import Expected
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     Outcome: TypeAlias = Located | UnmeasurableError
 
 LOCATED, REFUSED = 0, 1
+FEWEST_PX = 3.0  # of a radius; below there is no edge to speak of
 LEAST_FACING = 0.5  # cosine of the tilt
 
 
@@ -61,6 +63,7 @@ def locate(
 
     expected = _expect(radius, normal, normal_sigma_deg, thickness)
     document = parse(SensorDocument, read_text(sensor), str(sensor))
+    _check_radius(radius, document)
     images = [read_image(path, document.image_size) for path in (hole, stripe)]
     outcome: Outcome
     try:
@@ -79,10 +82,11 @@ def _expect(radius: float | None, normal: tuple[float, float, float] | None,
 
     from cell.metrology.features import Expected
 
-    for name, value in {"radius": radius, "thickness": thickness,
-                        "normal-sigma-deg": normal_sigma_deg}.items():
-        if value is not None and not 0 < value < math.inf:
-            raise DocumentError(f"expected a positive number; came {value}", source=f"--{name}")
+    for name, value, most in (("radius", radius, math.inf), ("thickness", thickness, 100.0),
+                              ("normal-sigma-deg", normal_sigma_deg, 90.0)):
+        if value is not None and not 0 < value <= most:
+            raise DocumentError(f"expected a number above 0{_at_most(most)}; came {value:g}",
+                                source=f"--{name}")
     direction = None
     if normal is not None:
         direction = np.array(normal, dtype=np.float64)
@@ -96,6 +100,19 @@ def _expect(radius: float | None, normal: tuple[float, float, float] | None,
                                 + " ".join(map(str, normal)), source="--normal")
     return Expected(normal=direction, normal_sigma=math.radians(normal_sigma_deg), radius=radius,
                     thickness=thickness)
+
+
+def _at_most(most: float) -> str:
+    return f" and at most {most:g}" if math.isfinite(most) else ""
+
+
+def _check_radius(radius: float | None, sensor: SensorDocument) -> None:
+    """Refuse a radius that this sensor cannot have in its image."""
+    one_px = sensor.model.working_distance / sensor.camera_matrix[0][0]
+    least, most = FEWEST_PX * one_px, max(sensor.image_size) * one_px
+    if radius is not None and not least <= radius <= most:
+        raise DocumentError(f"expected {least:.2g} to {most:.3g} mm, what fits this sensor's "
+                            f"image; came {radius:g}", source="--radius")
 
 
 def _answer(outcome: Outcome, as_json: bool) -> None:

@@ -48,7 +48,8 @@ def run(
     """
     from cell.programs.run import Request, run_job
 
-    signal.signal(signal.SIGTERM, _interrupt)
+    for number in (signal.SIGINT, signal.SIGTERM):  # a shell's background job ignores SIGINT
+        signal.signal(number, _interrupt)
     with _Progress() as progress:
         request = Request(job, cell, body, logs, speed, truth, part_temperature, live)
         finished = run_job(request, progress.advance)

@@ -217,6 +217,8 @@ def read_scene(path: Path) -> SceneDocument:
     """Read and check a scene; DocumentError where it cannot be read or is wrong."""
     try:
         text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise DocumentError(f"cannot be read: {error}", source=str(path)) from None
+    except UnicodeDecodeError:
+        raise DocumentError("expected UTF-8 text; came other bytes", source=str(path)) from None
+    except OSError as error:
+        raise DocumentError(f"cannot be read: {error.strerror}", source=str(path)) from None
     return parse(SceneDocument, text, str(path))

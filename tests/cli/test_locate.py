@@ -1,6 +1,8 @@
 """`cell locate` by its contract: what it prints, how it ends, and what it will not take."""
 
 import json
+import struct
+import zlib
 
 import cv2
 import numpy as np
@@ -106,13 +108,17 @@ def spoil(workplace, how):
         path.write_bytes(b"")
     elif how == "small":
         cv2.imwrite(str(path), np.zeros((480, 640), np.uint8))
+    elif how == "vast":  # says that it is, to fill the memory of who believes it
+        header = b"IHDR" + struct.pack(">IIBBBBB", 60000, 60000, 8, 0, 0, 0, 0)
+        path.write_bytes(content[:12] + header + struct.pack(">I", zlib.crc32(header))
+                         + content[33:])
     else:
         path.unlink()
 
 
 @pytest.mark.parametrize(("how", "said"), [
     ("cut", "cut short"), ("damaged", "damaged"), ("no image", "PNG"), ("empty", "empty"),
-    ("small", "768 x 576"), ("gone", "No such file")])
+    ("small", "768 x 576"), ("gone", "no such file"), ("vast", "came 60000")])
 def test_an_image_that_is_not_whole_is_bad_input(cell, words, workplace, how, said):
     spoil(workplace, how)
     code, out, err = cell("locate", *words, "--json")
@@ -126,9 +132,11 @@ def test_an_image_that_is_not_whole_is_bad_input(cell, words, workplace, how, sa
 
 
 @pytest.mark.parametrize("more", [
-    ("--radius", "-1"), ("--radius", "nan"), ("--normal", "0", "0", "0"),
-    ("--normal", "nan", "0", "1"), ("--normal", "0", "1", "0"), ("--normal-sigma-deg", "0"),
-    ("--thickness", "inf"), ("--sensor", "none.yaml"), ("--sensor", "jobs/demo.yaml")])
+    ("--radius", "-1"), ("--radius", "nan"), ("--radius", "1e6"), ("--radius", "1e-6"),
+    ("--radius", "much"), ("--method", "other"), ("--normal-sigma-deg", "1e9"),
+    ("--normal", "0", "0", "0"), ("--normal", "nan", "0", "1"), ("--normal", "0", "1", "0"),
+    ("--normal-sigma-deg", "0"), ("--thickness", "inf"), ("--sensor", "none.yaml"),
+    ("--sensor", "jobs/demo.yaml")])
 def test_words_that_make_no_sense_are_bad_input(cell, words, more):
     code, out, _ = cell("locate", *words, *more, "--json")
     assert code == 2

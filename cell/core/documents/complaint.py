@@ -56,8 +56,16 @@ def _sentence(fault: Mapping[str, Any], model: type[BaseModel], value: object, p
     if not path and not isinstance(value, dict):
         return f"expected a mapping with the keys {', '.join(model.model_fields)}; " \
                f"came {_came(value)}"
-    expected = fault["msg"].removeprefix("Value error, ").replace("Input should be", "expected")
-    return f"{expected}; came {_came(fault['input'])}{_hint(kind, fault['input'])}"
+    return f"{_expected(fault)}; came {_came(fault['input'])}{_hint(kind, fault['input'])}"
+
+
+def _expected(fault: Mapping[str, Any]) -> str:
+    if fault["type"] == "too_long":
+        return f"expected at most {fault['ctx']['max_length']} values"
+    if fault["type"] == "string_pattern_mismatch":
+        return f"expected text of the pattern {fault['ctx']['pattern']}"
+    words: str = fault["msg"]
+    return words.removeprefix("Value error, ").replace("Input should be", "expected")
 
 
 def _unknown(key: str, known: tuple[str, ...]) -> str:

@@ -74,6 +74,13 @@ class CameraSettings(Document):
             raise ValueError(f"a camera with `driver: {self.driver}` needs its `{needed}`")
         return self
 
+    @field_validator("scene")
+    @classmethod
+    def _stays_in_the_folder(cls, scene: str | None) -> str | None:
+        if scene is not None and (scene.startswith("/") or ".." in scene.split("/")):
+            raise ValueError("expected a file in the cell's own folder")
+        return scene
+
 
 class Box(Document):
     """A box aligned with the base frame, between two corners in mm."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from difflib import get_close_matches
 from cell.core.errors import DocumentError
 
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
+LARGEST = 1e12  # what lies beyond is no measure of anything
 DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+", re.ASCII)
 
 
@@ -39,7 +39,7 @@ class Row:
         if DECIMAL_COMMA.fullmatch(text):
             raise self.refuse(f"a decimal comma: write {text.replace(',', '.')} instead of {text}",
                               column)
-        if not NUMBER.fullmatch(text) or not math.isfinite(float(text)):
+        if not NUMBER.fullmatch(text) or abs(float(text)) > LARGEST:
             raise self.refuse(f"expected a finite number; came {text!r}", column)
         return float(text)
 
