@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 import traceback
 from contextlib import suppress
@@ -72,15 +73,23 @@ def _cell(version: bool = typer.Option(False, "--version", help="Print the versi
 
 def main() -> None:
     """Run one command and leave with its exit code."""
+    for number in (signal.SIGINT, signal.SIGTERM):  # a shell's background job ignores SIGINT
+        signal.signal(number, _interrupt)
     sys.exit(_run())
 
 
+def _interrupt(_number: int, _frame: object) -> None:
+    raise KeyboardInterrupt
+
+
 def _run() -> int:
-    try:
-        return app(standalone_mode=False) or 0
+    command = typer.main.get_command(app)
+    try:  # not app(): that turns an interrupt into a code without an answer, a broken pipe into 1
+        with command.make_context("cell", sys.argv[1:]) as context:
+            command.invoke(context)
     except typer.Exit as leave:
         return leave.exit_code
-    except (KeyboardInterrupt, typer.Abort):
+    except (KeyboardInterrupt, EOFError, typer.Abort):
         console.print("interrupted", style="yellow")
         return _fail(INTERRUPTED, "interrupted")
     except WRONG_WORDS as wrong:
@@ -93,6 +102,7 @@ def _run() -> int:
         traceback.print_exc()
         console.print("This is a fault of the program, not of your input.", style="red")
         return _fail(BUG, repr(bug))
+    return 0
 
 
 def _fail(code: int, detail: str) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -48,8 +47,6 @@ def run(
     """
     from cell.programs.run import Request, run_job
 
-    for number in (signal.SIGINT, signal.SIGTERM):  # a shell's background job ignores SIGINT
-        signal.signal(number, _interrupt)
     with _Progress() as progress:
         request = Request(job, cell, body, logs, speed, truth, part_temperature, live)
         finished = run_job(request, progress.advance)
@@ -58,10 +55,6 @@ def run(
     else:
         _print_table(finished)
     raise typer.Exit(_exit_code(finished))
-
-
-def _interrupt(_number: int, _frame: object) -> None:
-    raise KeyboardInterrupt
 
 
 def _exit_code(finished: Finished) -> int:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ipaddress
 import json
 import os
-import signal
 import subprocess
 import sys
 from typing import Any
@@ -75,7 +74,6 @@ def _check(model: str, address: str | None) -> None:
 def _start(model: str, address: str | None, speed: float) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "cell.sim.controller", "--model", model, "--speed", str(speed),
                "--parent", str(os.getpid())] + (["--address", address] if address else [])
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                             start_new_session=True)
 

@@ -1,0 +1,56 @@
+"""The door: whatever goes wrong, one exit code and, with --json, one object."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from cell.cli import door
+
+
+@pytest.mark.parametrize("words", [("run",), ("locate", "--radius", "1"), ("nothing",),
+                                   ("compare", "a.csv", "b.csv", "--loud")])
+def test_wrong_words_are_answered_too(cell, words):
+    code, out, err = cell(*words, "--json")
+    assert code == 2
+    assert json.loads(out)["reason"] == "bad_input"
+    assert "Usage" in err
+
+
+@pytest.mark.parametrize(("thrown", "code", "reason"), [
+    (KeyboardInterrupt(), 130, "interrupted"), (EOFError(), 130, "interrupted"),
+    (BrokenPipeError(32, "a pipe of the program's own"), 70, "program_fault"),
+    (ZeroDivisionError("nobody expected it"), 70, "program_fault")])
+def test_what_nobody_caught_never_reads_as_a_verdict(cell, monkeypatch, thrown, code, reason):
+    def stumble(*_):
+        raise thrown
+
+    monkeypatch.setattr("cell.archive.files.read_bytes", stumble)
+    left, out, _ = cell("compare", "a.csv", "b.csv", "--json")
+    assert left == code
+    assert json.loads(out)["reason"] == reason
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_background_job_can_be_stopped(number):
+    def ignore():
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # as a shell does to what it sends to the back
+
+    process = subprocess.Popen([sys.executable, "-m", "cell", "sim", "--json"], preexec_fn=ignore,
+                               stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    try:
+        assert json.loads(process.stdout.readline())["ok"] is True
+        os.kill(process.pid, number)
+        process.wait(30)
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+    assert process.returncode == 0
+
+
+def test_the_reasons_cover_every_code():
+    assert set(door.REASONS) == {2, 3, 4, 70, 130}
