@@ -33,7 +33,7 @@ class CameraModel:
 
     def to_pixels(self, normalised: ArrayLike) -> Array:
         """Distort normalised coordinates (..., 2) and turn them into pixels (..., 2)."""
-        x, y = np.moveaxis(np.asarray(normalised, dtype=np.float64), -1, 0)
+        x, y = _parts(normalised)
         x_d, y_d, *_ = _distort(x, y, self.distortion)
         k = self.matrix
         return np.stack([k[0, 0] * x_d + k[0, 1] * y_d + k[0, 2], k[1, 1] * y_d + k[1, 2]], axis=-1)
@@ -44,7 +44,7 @@ class CameraModel:
         Newton's iteration from the pinhole's answer; OpenCV's function differs by version.
         """
         k = self.matrix
-        u, v = np.moveaxis(np.asarray(pixels, dtype=np.float64), -1, 0)
+        u, v = _parts(pixels)
         y_d = (v - k[1, 2]) / k[1, 1]
         x_d = (u - k[0, 2] - k[0, 1] * y_d) / k[0, 0]
         x, y = x_d, y_d
@@ -59,14 +59,14 @@ class CameraModel:
 
     def pixel_by_normalised(self, normalised: ArrayLike) -> Array:
         """Differentiate pixels by normalised coordinates (..., 2): matrices (..., 2, 2)."""
-        x, y = np.moveaxis(np.asarray(normalised, dtype=np.float64), -1, 0)
+        x, y = _parts(normalised)
         _, _, f_x, f_y, g_x, g_y = _distort(x, y, self.distortion)
         rows = np.stack([np.stack([f_x, f_y], axis=-1), np.stack([g_x, g_y], axis=-1)], axis=-2)
         return self.matrix[:2, :2] @ rows
 
     def pixel_by_intrinsics(self, normalised: ArrayLike) -> Array:
         """Differentiate pixels by fx, fy, cx, cy, k1, k2, p1, p2, k3: matrices (..., 2, 9)."""
-        x, y = np.moveaxis(np.asarray(normalised, dtype=np.float64), -1, 0)
+        x, y = _parts(normalised)
         x_d, y_d, *_ = _distort(x, y, self.distortion)
         r2, xy, none, one = x * x + y * y, 2.0 * x * y, np.zeros_like(x), np.ones_like(x)
         linear = np.stack([np.stack([x_d, none, one, none], axis=-1),
@@ -80,6 +80,11 @@ class CameraModel:
         """Undistort pixels (..., 2) to rays (..., 3) with z = 1."""
         normalised = self.normalise(pixels)
         return np.concatenate([normalised, np.ones((*normalised.shape[:-1], 1))], axis=-1)
+
+
+def _parts(pairs: ArrayLike) -> tuple[Array, Array]:
+    both = np.asarray(pairs, dtype=np.float64)
+    return both[..., 0], both[..., 1]
 
 
 def _distort(x: Array, y: Array, distortion: Array) -> tuple[Array, ...]:

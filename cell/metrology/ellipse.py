@@ -12,8 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cell.core.geometry import Array
+from cell.core.geometry import Array, cross
 from cell.core.optics import CameraModel
+
+X_AXIS, Y_AXIS = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +35,8 @@ class Ellipse:
         """Build from the points (n, 2) of an ellipse spaced evenly in its parameter t."""
         located = np.asarray(points, dtype=np.float64)
         centre = located.mean(axis=0)
-        return cls(centre, _root(2.0 * np.cov((located - centre).T, bias=True)))
+        away = located - centre
+        return cls(centre, _root(2.0 / len(away) * away.T @ away))
 
     @property
     def radius(self) -> float:
@@ -53,7 +56,7 @@ class Ellipse:
     def normals(self, t: Array) -> Array:
         """Give the unit outward normals (n, 2) at the parameters t (n,)."""
         outward = _circle(t) @ np.linalg.inv(self.shape)
-        return outward / np.linalg.norm(outward, axis=1, keepdims=True)
+        return outward / np.hypot(outward[:, :1], outward[:, 1:])
 
     def design(self, t: Array) -> Array:
         """Give how far the ellipse moves along its normals (n, 5) for each of its five numbers.
@@ -61,7 +64,7 @@ class Ellipse:
         The columns are centre x and y and the elements 00, 01 and 11 of the shape.
         """
         (cos, sin), (n_x, n_y) = _circle(t).T, self.normals(t).T
-        return np.column_stack([n_x, n_y, n_x * cos, n_x * sin + n_y * cos, n_y * sin])
+        return np.stack([n_x, n_y, n_x * cos, n_x * sin + n_y * cos, n_y * sin], axis=-1)
 
     def moved(self, step: Array) -> Ellipse:
         """Move by the five numbers of `design`."""
@@ -77,15 +80,17 @@ class Ellipse:
 
 def project_circle(camera: CameraModel, centre: Array, normal: Array, radius: float) -> Ellipse:
     """Project the circle around `centre` (3,) mm, through lens and distortion, to pixels."""
-    u = np.cross(normal, [0.0, 1.0, 0.0] if abs(normal[1]) < abs(normal[0]) else [1.0, 0.0, 0.0])
+    u = cross(normal, Y_AXIS if abs(normal[1]) < abs(normal[0]) else X_AXIS)
     u = u / np.linalg.norm(u)
-    v = np.cross(normal / np.linalg.norm(normal), u)
-    turn = _circle(np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False))
-    return Ellipse.through(camera.project(centre + radius * turn @ np.stack([u, v])))
+    v = cross(normal / np.linalg.norm(normal), u)
+    return Ellipse.through(camera.project(centre + radius * ROUND @ np.stack([u, v])))
 
 
 def _circle(t: Array) -> Array:
-    return np.column_stack([np.cos(t), np.sin(t)])
+    return np.stack([np.cos(t), np.sin(t)], axis=-1)
+
+
+ROUND = _circle(np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False))
 
 
 def _root(matrix: Array) -> Array:

@@ -15,7 +15,7 @@ from typing import TypeAlias
 import numpy as np
 
 from cell.core.documents.result import Located
-from cell.core.geometry import Array, Plane, Transform
+from cell.core.geometry import Array, Plane, Transform, cross
 from cell.core.optics import SensorModel
 from cell.metrology.conic import circle_centre_ray, fit_conic
 from cell.metrology.features import Expected, Rim, Stripe
@@ -89,7 +89,7 @@ def _tangents(normal: Array, stripe: StripeSight) -> Array:
     light = stripe.camera_from_stripe_camera.turn(stripe.light_plane.normal)
     first = light - normal * (light @ normal)
     first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(normal, first)])
+    return np.stack([first, cross(normal, first)])
 
 
 def _prior(start: Circle, rim: Rim, expected: Expected) -> Prior:

@@ -13,7 +13,7 @@ from cell.core.documents.result import Located, Measured, NotMeasured, Outcome
 from cell.core.errors import UnmeasurableError
 from cell.core.geometry import Array
 from cell.core.observation import Observation
-from cell.metrology.body_frame import body_budget, reached
+from cell.metrology.body_frame import body_budget
 from cell.metrology.joint import locate_joint
 from cell.metrology.locate import Method
 from cell.metrology.sightings import Sighting, see, stripes_of
@@ -56,7 +56,7 @@ def _locate(sightings: list[Sighting], calibration: Calibration,
 
 def _in_body(located: Located, two_step: Located, reference: Sighting, hole: Hole,
              calibration: Calibration) -> Measured:
-    base_from_flange = reached(reference.ring, calibration.kinematics)
+    base_from_flange = reference.base_from_flange
     body_from_camera = calibration.body_from_camera(base_from_flange)
     budget = body_budget(located.sources, located.centre, base_from_flange, calibration)
     if hole.side == "back":

@@ -28,11 +28,12 @@ ELSEWHERE = 0.5  # mm: pictures from one place share their speckle, so that one 
 @dataclass(frozen=True, eq=False)
 class Sighting:
     """A pair of views of one attempt, and what was detected in it. `index` is the place of the ring
-    view among the observation's views, `others` are the attempt's further laser views.
+    view among the observation's views, `base_from_flange` where the arm stood then, and `others`
+    are the attempt's further laser views.
     """
 
     index: int
-    ring: View
+    base_from_flange: Transform
     laser: View
     others: tuple[View, ...]
     rim: Rim
@@ -62,17 +63,18 @@ def see(observation: Observation, hole: Hole, calibration: Calibration,
 def _see(observation: Observation, attempt: int, hole: Hole, calibration: Calibration,
          normal_sigma: float) -> Sighting:
     index, ring = _last(observation, attempt)
+    base_from_flange = reached(ring, calibration.kinematics)
     lasers = sorted((view for view in observation.views
                      if view.attempt == attempt and view.light == "laser"),
-                    key=lambda view: reached(view).distance(reached(ring)))
+                    key=lambda view: ring.base_from_flange_after.distance(
+                        view.base_from_flange_before))
     if not lasers:
         raise refusal("no_laser", "there is no view with the laser")
     _check_still(ring, lasers[0])
-    camera_from_body = calibration.body_from_camera(
-        reached(ring, calibration.kinematics)).inverse
+    camera_from_body = calibration.body_from_camera(base_from_flange).inverse
     expected = expect(hole, camera_from_body @ observation.body_from_predicted, normal_sigma)
     rim, stripe = detect_pair(ring.image, lasers[0].image, calibration.sensor.model, expected)
-    return Sighting(index, ring, lasers[0], tuple(lasers[1:]), rim, stripe, expected)
+    return Sighting(index, base_from_flange, lasers[0], tuple(lasers[1:]), rim, stripe, expected)
 
 
 def _last(observation: Observation, attempt: int) -> tuple[int, View]:
@@ -98,9 +100,10 @@ def stripes_of(sightings: list[Sighting], calibration: Calibration) -> list[Shot
     reference = sightings[0]
     shots = [(reference.stripe, Transform.identity())]
     for sighting in sightings:
-        pose = _camera_from(reference.ring, sighting.laser, calibration)
-        if sighting is not reference and _elsewhere(pose, shots):
-            shots.append((_loosened(sighting.stripe, calibration), pose))
+        if sighting is not reference:
+            pose = _camera_from(reference, sighting.laser, calibration)
+            if _elsewhere(pose, shots):
+                shots.append((_loosened(sighting.stripe, calibration), pose))
         shots += _strays(sighting, shots, calibration, reference)
     return shots
 
@@ -111,7 +114,7 @@ def _strays(sighting: Sighting, shots: list[Shot], calibration: Calibration,
     sensor = calibration.sensor.model
     found: list[Shot] = []
     for view in sighting.others:
-        pose = _camera_from(reference.ring, view, calibration)
+        pose = _camera_from(reference, view, calibration)
         if _elsewhere(pose, [*shots, *found]):
             circle = solve_circle(reference.rim, shots[:1], sensor, reference.expected).circle
             there = pose.inverse
@@ -126,12 +129,10 @@ def _strays(sighting: Sighting, shots: list[Shot], calibration: Calibration,
     return found
 
 
-def _camera_from(ring: View, laser: View, calibration: Calibration) -> Transform:
+def _camera_from(reference: Sighting, laser: View, calibration: Calibration) -> Transform:
     """`camera_from_stripe_camera`, by the reached flange poses."""
     flange_from_camera = calibration.flange_from_camera
-    base_from_ring, base_from_laser = (reached(view, calibration.kinematics)
-                                       for view in (ring, laser))
-    moved = base_from_ring.inverse @ base_from_laser
+    moved = reference.base_from_flange.inverse @ reached(laser, calibration.kinematics)
     return flange_from_camera.inverse @ moved @ flange_from_camera
 
 

@@ -14,14 +14,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from cell.core.geometry import Array, Plane
+from cell.core.geometry import Array, Plane, cross
 from cell.core.optics import SensorModel
 from cell.metrology.error_model import chord_midpoint_error
 from cell.metrology.features import Rim, Stripe
 from cell.metrology.joint_rows import Circle
 
 X_AXIS = np.array([1.0, 0.0, 0.0])
-ROUND = np.linspace(0.0, 2.0 * np.pi, 73)
+TURN = np.linspace(0.0, 2.0 * np.pi, 73)
+ROUND = np.stack([np.cos(TURN), np.sin(TURN)], axis=-1)
 
 
 def trace_circle(circle: Circle, rim: Rim, stripe: Stripe, sensor: SensorModel) -> dict[str, Array]:
@@ -29,8 +30,8 @@ def trace_circle(circle: Circle, rim: Rim, stripe: Stripe, sensor: SensorModel) 
     centre, normal, radius = circle.centre, circle.normal, circle.radius
     first = X_AXIS - normal[0] * normal  # what the camera sees never faces along its x
     first = first / np.linalg.norm(first)
-    second = np.cross(normal, first)
-    round_it = centre + radius * (np.cos(ROUND)[:, None] * first + np.sin(ROUND)[:, None] * second)
+    second = cross(normal, first)
+    round_it = centre + radius * ROUND @ np.stack([first, second])
     points = {"centre": centre, **_chord(centre, normal, radius, sensor.light_plane)}
     return {"rim": rim.points, "stripe": stripe.points, "ellipse": sensor.camera.project(round_it),
             **{name: sensor.camera.project(point) for name, point in points.items()}}
@@ -41,6 +42,6 @@ def _chord(centre: Array, normal: Array, radius: float, plane: Plane) -> dict[st
     square = radius**2 - float(np.sum((middle - centre)**2))
     if square <= 0:
         return {}
-    along = np.cross(normal, plane.normal)
+    along = cross(normal, plane.normal)
     arm = np.sqrt(square) * along / np.linalg.norm(along)
     return {"chord": np.stack([middle - arm, middle + arm]), "q": middle}
