@@ -53,6 +53,15 @@ def shape_step(offsets: Array, profile: Profile) -> Step:
     return Step(lift_near + share * by_wall, slopes)
 
 
+def shape_edge(offsets: Array, profile: Profile) -> Step:
+    """Give the step S of every profile, and its slope by where the sheet ends alone: (n, 1, m)."""
+    near = (offsets - profile.edge[:, None]) / profile.blur
+    far = near + np.maximum(profile.width, 0.0)[:, None] / profile.blur
+    share = profile.share[:, None]
+    slope = (share - 1.0) * _bell(near) - share * _bell(far)
+    return Step((1.0 - share) * ndtr(near) + share * ndtr(far), slope[:, None] / profile.blur)
+
+
 def fit_levels(grey: Array, shape: Array) -> tuple[Array, Array]:
     """Fit the two levels of every ray: residuals (n, m) and height of the step (n,)."""
     high = shape - shape.mean(axis=1, keepdims=True)

@@ -14,7 +14,7 @@ import numpy as np
 from cell.core.geometry import Array
 from cell.metrology.arrays import Mask
 from cell.metrology.band import Band
-from cell.metrology.profile import Profile, fit_levels, shape_step, without_levels
+from cell.metrology.profile import Profile, fit_levels, shape_edge, shape_step, without_levels
 from cell.metrology.spread import middle, tukey_weights
 from cell.metrology.wall import Wall
 
@@ -79,6 +79,8 @@ def fit_profile(band: Band, rays: Mask, walls: list[Wall], *, doubled: bool = Tr
         starts = [model.prior]
         if doubled and wall.widest > NOTABLE_WALL:
             starts.append(model.prior + model.onto_near_rim(wall))
+        if wall is not walls[0] and not doubled:
+            starts = [np.append(best[:6], model.prior[6:])]  # another wall, and else not far
         for start in starts:
             state, misfit = _descend(model, sparse, start)
             if misfit < wall.worth * least:
@@ -117,11 +119,11 @@ def locate_edges(band: Band, profile: Profile) -> tuple[Array, Array, Array]:
     """
     found = profile
     for _ in range(2):
-        step = shape_step(band.offsets, found)
+        step = shape_edge(band.offsets, found)
         miss, height = fit_levels(band.grey, step.shape)
-        slope = without_levels(step.slopes[:, :1], step.shape)[:, 0] * height[:, None]
+        slope = without_levels(step.slopes, step.shape)[:, 0] * height[:, None]
         square = np.maximum(np.einsum("nm,nm->n", slope, slope), 1e-9)
         move = np.einsum("nm,nm->n", slope, miss) / square
         found = replace(found, edge=found.edge + np.clip(move, -1.0, 1.0))
-    miss, height = fit_levels(band.grey, shape_step(band.offsets, found).shape)
+    miss, height = fit_levels(band.grey, shape_edge(band.offsets, found).shape)
     return found.edge, height, np.sqrt((miss**2).mean(axis=1))

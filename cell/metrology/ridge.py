@@ -17,6 +17,7 @@ from cell.metrology.arrays import Grey, Mask
 
 BIN = 4                # lines along the stripe that are averaged before the search
 NARROW, WIDE = 2.0, 8.0  # px, the scales that a ridge stands out between
+COARSE = 4             # px across, that the ground is averaged over first
 MOST = 2               # ridges
 DRAWS = 300
 TOLERANCE = 2.5        # px, lens distortion over the length included
@@ -104,9 +105,10 @@ def _longest(response: Grey, u: Array, line: Array, height: Array) -> tuple[Mask
 def _response(turned: Image) -> Grey:
     length, width = turned.shape
     binned = cv2.resize(turned, (width, max(1, length // BIN)), interpolation=cv2.INTER_AREA)
-    lines = binned.astype(np.float32)
-    return (cv2.GaussianBlur(lines, (0, 0), sigmaX=NARROW, sigmaY=0.8)
-            - cv2.GaussianBlur(lines, (0, 0), sigmaX=WIDE, sigmaY=0.8))
+    lines = cv2.GaussianBlur(binned.astype(np.float32), (0, 0), sigmaX=NARROW, sigmaY=0.8)
+    coarse = cv2.resize(lines, (max(1, width // COARSE), len(lines)), interpolation=cv2.INTER_AREA)
+    ground = cv2.GaussianBlur(coarse, (15, 1), sigmaX=WIDE / COARSE)
+    return lines - cv2.resize(ground, (width, len(lines)), interpolation=cv2.INTER_LINEAR)
 
 
 def _along(response: Grey, offset: float, slope: float) -> Array:
