@@ -30,7 +30,7 @@ from cell.cli.sim import sim
 from cell.cli.study import study_app
 from cell.cli.view import view
 from cell.cli.words import console, print_json
-from cell.core.errors import BUG, INTERRUPTED, CellError
+from cell.core.errors import BUG, INTERRUPTED, CellError, DocumentError
 
 app = typer.Typer(
     name="cell",
@@ -94,7 +94,7 @@ def _run() -> int:
         return _fail(INTERRUPTED, "interrupted")
     except WRONG_WORDS as wrong:
         wrong.show()
-        return _fail(wrong.exit_code, wrong.format_message())
+        return _fail(DocumentError.exit_code, wrong.format_message())
     except CellError as error:
         console.print(f"[red]error:[/red] {escape(str(error))}", highlight=False, soft_wrap=True)
         return _fail(error.exit_code, str(error))
