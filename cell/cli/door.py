@@ -45,23 +45,11 @@ WRONG_WORDS: Any = typer.BadParameter.__mro__[2]  # the base of usage errors, wh
 REASONS = {2: "bad_input", 3: "device_fault", 4: "recording_failed", BUG: "program_fault",
            INTERRUPTED: "interrupted"}
 
-app.command()(run)
-app.add_typer(calibrate)
-app.command()(report)
-app.command()(locate)
-app.command()(error_model)
-app.add_typer(study_app)
-app.command()(approve)
-app.add_typer(results_app)
-app.command()(shift)
-app.command()(audit)
-app.command()(repair)
-app.command()(prune)
-app.command()(view)
-app.add_typer(seal_key_app)
-app.command()(check)
-app.command()(compare)
-app.command()(sim)
+for command in (run, shift, check, report, view, audit, repair, prune, locate, compare,
+                error_model, approve, sim):
+    app.command()(command)
+for group in (calibrate, study_app, results_app, seal_key_app):
+    app.add_typer(group)
 
 
 @app.callback(invoke_without_command=True)
