@@ -14,6 +14,8 @@ import typer
 from cell.cli.words import answers, print_json
 from cell.core.errors import DeviceError, DocumentError
 
+HOME_DEG = "137.939,-109.974,123.23,1.512,47.073,157.747"  # of the demo cell: free to drive from
+
 HOW_TO_CONNECT = """\
 Emulated [bold]{model}[/bold] at [bold]{address}[/bold], time x{speed:g}
 
@@ -33,6 +35,8 @@ def sim(
     address: str | None = typer.Option(None, help="A loopback address, 127.x.y.z; a free one is "
                                                   "chosen if not given."),
     speed: float = typer.Option(1.0, min=0.01, max=100.0, help="Time runs this many times faster."),
+    joints_deg: str = typer.Option(HOME_DEG, metavar="A,B,C,D,E,F", help="Where the arm stands; "
+                                   "the demo cell's home unless given."),
     as_json: bool = typer.Option(False, "--json", help="Print one JSON object when it is ready."),
 ) -> None:
     """Start an emulated UR controller in the foreground and print how to connect to it.
@@ -41,7 +45,7 @@ def sim(
     listens on the loopback interface only. Point a cell's file, ur-rtde or URSim's clients at it.
     """
     _check(model, address)
-    process = _start(model, address, speed)
+    process = _start(model, address, speed, _six_angles(joints_deg))
     try:
         ready = _read_ready(process)
         if as_json:
@@ -71,9 +75,22 @@ def _check(model: str, address: str | None) -> None:
                             place="--address")
 
 
-def _start(model: str, address: str | None, speed: float) -> subprocess.Popen[str]:
+def _six_angles(text: str) -> str:
+    """Refuse what is not six angles of a joint."""
+    try:
+        angles = [float(angle) for angle in text.split(",")]
+    except ValueError:
+        angles = []
+    if len(angles) != 6 or not all(abs(angle) <= 360.0 for angle in angles):
+        raise DocumentError(f"expected six angles in degrees, such as {HOME_DEG}; came {text!r}",
+                            place="--joints-deg")
+    return text
+
+
+def _start(model: str, address: str | None, speed: float, joints: str) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "cell.sim.controller", "--model", model, "--speed", str(speed),
-               "--parent", str(os.getpid())] + (["--address", address] if address else [])
+               f"--joints={joints}", "--parent", str(os.getpid())]
+    command += ["--address", address] if address else []
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                             start_new_session=True)
 

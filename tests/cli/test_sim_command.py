@@ -5,8 +5,13 @@ import signal
 import socket
 import subprocess
 import sys
+from pathlib import Path
 
+import numpy as np
 import pytest
+import yaml
+
+DEMO = Path(__file__).parents[2] / "calibration" / "demo"
 
 
 def start(*words):
@@ -31,10 +36,25 @@ def test_it_serves_until_ctrl_c():
         socket.create_connection((ready["address"], 29999), timeout=5.0)
 
 
+def test_the_arm_stands_where_the_demo_cell_can_drive_from():
+    home = yaml.safe_load((DEMO / "cell.yaml").read_text())["home_deg"]
+    running = start("--json")
+    address = json.loads(running.stdout.readline())["address"]
+    with socket.create_connection((address, 29900), timeout=5.0) as referee:
+        referee.sendall(b"truth\n")
+        with referee.makefile() as answers:
+            stands = json.loads(answers.readline())["joints"]
+    running.kill()
+    running.communicate()
+    assert np.degrees(stands) == pytest.approx(home, abs=1e-3)
+
+
 @pytest.mark.parametrize(("words", "complaint"), [
     (["--address", "10.0.0.1"], "expected a loopback address"),
     (["--address", "cell"], "expected a loopback address"),
-    (["--model", "ur99"], "unknown model 'ur99'")])
+    (["--model", "ur99"], "unknown model 'ur99'"),
+    (["--joints-deg", "0,-90,0"], "expected six angles"),
+    (["--joints-deg", "0,-90,0,nan,0,0"], "expected six angles")])
 def test_what_cannot_be_is_refused(words, complaint):
     refused = start("--json", *words)
     answer, error = refused.communicate(timeout=30)
