@@ -31,13 +31,14 @@ from cell.metrology.profile import Profile
 from cell.metrology.profile_fit import fit_profile, locate_edges
 from cell.metrology.reasons import refusal
 from cell.metrology.rim_fit import agree, settle
-from cell.metrology.spread import correlation_length, robust_sigma
+from cell.metrology.spread import correlation_length, middle, robust_sigma
 from cell.metrology.wall import doubt_of_wall, is_known, lit, predict_wall, suspect_walls
 
 WIDE = 8.0             # px to either side, where edges are looked for first
 OUTWARD = 3.0          # px of sheet in a grey profile: more would add its texture
 INWARD = 3.0           # px of hole beyond the wall
 MANY = 0.87            # profiles an edge, below which two rims may show
+NOTICED = 0.7          # px of wall, below which its brightness makes no difference
 ROUGH_SPACING, SPACING = 3.0, 1.5  # px along the rim
 SHARP = 1.0            # px of blur by the lens, above which the edge itself may be rounded
 LIT_DOUBT, DARK_DOUBT = 0.5, 0.25  # of what a wall draws the edge by: a dark one is like another
@@ -73,14 +74,17 @@ def detect_rim(image: Image, hole: Hole, camera: CameraModel, expected: Expected
     rough, seen, doubled = _rough_rim(hole)
     walls = [predict_wall(rough, hole, camera, expected)]
     known = is_known(expected)
-    walls += [lit(walls[0])] if known or not doubled else suspect_walls(walls[0])
+    if doubled and not known:
+        walls += suspect_walls(walls[0])
+    elif doubled or walls[0].widest > NOTICED:
+        walls.append(lit(walls[0]))
     band = _profiles(hole.patch, rough, max(wall.widest for wall in walls))
     rays = np.repeat(seen, -(-len(band.t) // len(seen)))[:len(band.t)]
     profile = fit_profile(band, rays, walls, doubled=doubled or hole.inside > 0)
     edge, height, misfit = locate_edges(band, profile)
-    step = abs(float(np.median(height[rays])))
-    check_clear(step, float(np.median(misfit[rays])), profile.blur)
-    good = rays & (misfit < 3.0 * np.median(misfit[rays])) & (np.abs(edge - profile.edge) < 2.0)
+    unrest = middle(misfit[rays])
+    check_clear(abs(middle(height[rays])), unrest, profile.blur)
+    good = rays & (misfit < 3.0 * unrest) & (np.abs(edge - profile.edge) < 2.0)
     rim = _rim(band, edge, good, profile, hole)
     doubt = 0.0 if known else doubt_of_wall(walls[0], profile)
     return replace(rim, ambiguity=rim.ambiguity + doubt)

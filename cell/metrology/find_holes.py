@@ -16,6 +16,7 @@ from cell.metrology.edges import find_edges
 from cell.metrology.ellipse import Ellipse, project_circle
 from cell.metrology.features import Expected
 from cell.metrology.rim_fit import agree
+from cell.metrology.spread import middle
 from cell.metrology.voting import Circle, vote_for_circles
 
 SMALLEST_RADIUS = 14.0  # px, of a hole that nothing is known of
@@ -84,7 +85,7 @@ def _look(image: Image, circle: Circle, expected: Expected, camera: CameraModel)
     patch = smooth_around(image, start, 2.0 * MARGIN * circle.radius)
     step = max(0.5, circle.radius / 60.0)
     band = sample_band(patch, start, spread(MARGIN * circle.radius, step), RAYS)
-    steepest = float(np.median((-circle.inside * band.slope).max(axis=1)))
+    steepest = middle((-circle.inside * band.slope).max(axis=1))
     edges = find_edges(band, circle.inside, max(0.4 * steepest, 1e-3))
     if len(edges.ray) < LEAST_COVERAGE * RAYS:
         return None
@@ -93,12 +94,12 @@ def _look(image: Image, circle: Circle, expected: Expected, camera: CameraModel)
     seen = edges[close].rays(RAYS)
     if seen.mean() < LEAST_COVERAGE or not 0.6 < ellipse.radius / circle.radius < 1.6:
         return None
-    contrast = float(np.median(edges.strength[close]))
+    contrast = middle(edges.strength[close])
     inner, outer = band.levels(0.3 * MARGIN * circle.radius)
-    rise = float(np.median(circle.inside * (inner - outer)[seen]))
+    rise = middle(circle.inside * (inner - outer)[seen])
     if rise < 0.3 * EDGE_WIDTH * contrast:  # a line, not a step: scratch, groove, glint
         return None
-    glow = float(np.median(inner[seen]) / max(float(np.median(outer[seen])), 1e-3))
+    glow = middle(inner[seen]) / max(middle(outer[seen]), 1e-3)
     return Hole(ellipse, circle.inside, float(seen.mean()), contrast, glow, patch)
 
 

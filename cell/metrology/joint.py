@@ -58,8 +58,13 @@ def locate_joint(rim: Rim, stripes: Sequence[Shot], sensor: SensorModel,
 def solve_circle(rim: Rim, stripes: Sequence[Shot], sensor: SensorModel,
                  expected: Expected) -> Posterior:
     """Solve for the circle; an `expected.normal_sigma` near zero holds the normal."""
-    sight = Sight.of(rim, sensor.camera)
     crossings = tuple(StripeSight.of(stripe, sensor, pose) for stripe, pose in stripes)
+    return solve_seen(rim, Sight.of(rim, sensor.camera), crossings, expected)
+
+
+def solve_seen(rim: Rim, sight: Sight, crossings: tuple[StripeSight, ...],
+               expected: Expected) -> Posterior:
+    """Solve for the circle from a rim and stripes that are undistorted already."""
     start = _start(sight, crossings, expected)
     return solve_all(Problem(sight, crossings, _prior(start, rim, expected)), start)
 

@@ -24,12 +24,14 @@ from cell.core.geometry import Array, Plane, Transform
 from cell.core.optics import SensorModel
 from cell.metrology.conic import chord, ellipse_centre, fit_conic, fit_line
 from cell.metrology.features import Expected, Rim, Stripe
-from cell.metrology.joint import normal_sigma, solve_circle
+from cell.metrology.joint import normal_sigma, solve_seen
+from cell.metrology.joint_rows import Sight, StripeSight
 from cell.metrology.reasons import refusal
 from cell.metrology.trace import trace_circle
 from cell.metrology.uncertainty import shares, total, two_step_budget
 
 HELD = 1e-6  # rad: a normal that is not estimated
+UNMOVED = Transform.identity()
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +77,11 @@ def locate_two_step(rim: Rim, stripe: Stripe, sensor: SensorModel, expected: Exp
     Raises:
         UnmeasurableError: not enough points, no ellipse, or the stripe misses the hole.
     """
-    conic = fit_conic(sensor.camera.normalise(rim.points))
-    line = fit_line(sensor.camera.normalise(stripe.points))
+    sight, crossing = Sight.of(rim, sensor.camera), StripeSight.of(stripe, sensor, UNMOVED)
+    conic, line = fit_conic(sight.rays[:, :2]), fit_line(crossing.sight.rays[:, :2])
     solved = solve_two_step(conic, line, sensor.light_plane)
     held = replace(expected, normal_sigma=HELD)
-    solution = solve_circle(rim, [(stripe, Transform.identity())], sensor, held).solutions[0]
+    solution = solve_seen(rim, sight, (crossing,), held).solutions[0]
     budget = two_step_budget(np.append(solved.centre, solved.radius), solution,
                              normal_sigma(expected), rim, sensor)
     trace = {"chord": np.stack([solved.A, solved.B]), "q": solved.Q, "centre": solved.centre}

@@ -89,8 +89,9 @@ def doubt_of_wall(wall: Wall, profile: Profile) -> float:
 
 
 def lit(wall: Wall) -> Wall:
-    """Let the wall be as bright as it may."""
-    return replace(wall, share=max(wall.share, BRIGHTLY), share_sigma=BRIGHTLY, worth=LITTLE)
+    """Let the wall be as bright as it may; before something lit, a dark one is far likelier."""
+    return replace(wall, share=max(wall.share, BRIGHTLY), share_sigma=BRIGHTLY,
+                   worth=MUCH if wall.share < -BRIGHTLY / 2.0 else LITTLE)
 
 
 def suspect_walls(predicted: Wall) -> list[Wall]:
