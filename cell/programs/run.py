@@ -71,7 +71,7 @@ def run_job(request: Request, watch: Watch) -> Finished:
     watch(0, len(prepared.stops), "opening the cell")
     with (open_station(prepared.papers.station, prepared.folder, request.speed) as station,
           LiveView() if request.live else nullcontext() as live):
-        prepared.check_identity(station.identity)
+        prepared.check_devices(station)
         start = begin(prepared, station, body_id, log.stem, conditions=request.conditions)
         inspection = BodyInspection(station, prepared, start, Recorder(log, start, live), watch)
         status = measure(inspection)

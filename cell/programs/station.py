@@ -25,6 +25,7 @@ from cell.sim.controller.process import EmulatedController
 class Station:
     """The open devices of one cell.
 
+    `identity` is the robot's own word, `image_size` (width, height) the camera's.
     `world` is the simulated camera of a virtual cell, which can say the truth and put another body
     on the station; None at a real one. `speed` is how much faster than real time a virtual cell
     runs.
@@ -35,6 +36,7 @@ class Station:
     lights: Lights
     camera: Camera
     identity: RobotIdentity
+    image_size: tuple[int, int]
     speed: float = 1.0
     world: SimulatedCamera | None = None
 
@@ -73,10 +75,10 @@ def open_station(document: StationDocument, folder: Path, speed: float = 1.0) ->
         closing.callback(lights.off)
         camera = _open_camera(document, folder, address, speed)
         closing.callback(camera.close)
-        camera.open()
+        image_size = camera.open()
         closing.callback(lights.off)  # last in, first out: before anything that may block
         world = camera if isinstance(camera, SimulatedCamera) else None
-        yield Station(document, robot, lights, camera, identity, speed, world)
+        yield Station(document, robot, lights, camera, identity, image_size, speed, world)
 
 
 def _controller_address(document: StationDocument, speed: float, closing: ExitStack) -> str:

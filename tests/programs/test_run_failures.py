@@ -71,6 +71,13 @@ def test_no_robot_at_the_address_is_a_device_fault(plant: Path) -> None:
     assert not list((plant / "logs").glob("*.rrd"))
 
 
+def test_a_camera_of_another_size_is_a_device_fault_before_anything_moves(plant: Path) -> None:
+    change(plant / "calibration/demo/scene.yaml", "image_size: [768, 576]",
+           "image_size: [640, 480]")
+    assert "640 x 480" in refusal(cell_run(plant), 3)
+    assert not list((plant / "logs").glob("*.rrd"))
+
+
 def test_a_robot_in_local_mode_is_a_device_fault_that_says_what_to_do(plant: Path) -> None:
     with EmulatedController("ur10e") as controller:
         controller.tell_referee("local_mode on")

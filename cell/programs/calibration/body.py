@@ -70,7 +70,7 @@ def register_body(request: BodyRequest, operator: Operator) -> Registered:
     if not operator.confirm("Is the master body in the fixture, clamped, and the way clear?"):
         raise DocumentError("stopped by the operator")
     with open_station(prepared.papers.station, prepared.folder, request.speed) as station:
-        prepared.check_identity(station.identity)
+        prepared.check_devices(station)
         if station.world is not None:
             station.world.deliver_master()
         datums = _measure(chosen, station, prepared, operator)

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from cell.archive.papers import PapersFound, read_papers
 from cell.core.documents.papers import Papers, check_identity
+from cell.core.errors import DeviceError
 from cell.core.kinematics import Arm, arm_for
-from cell.core.ports import RobotIdentity
 from cell.metrology.plan import PlannedStop, plan_stops
+from cell.programs.station import Station
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,10 +25,20 @@ class Prepared:
     arm: Arm
     stops: tuple[PlannedStop, ...]
 
-    def check_identity(self, identity: RobotIdentity) -> None:
-        """Refuse a robot other than the one that the calibration set was made with."""
-        check_identity(self.papers.calibration.hand_eye.robot, identity,
+    def check_devices(self, station: Station) -> None:
+        """Compare robot and camera with the calibration set.
+
+        Raises:
+            DocumentError: the set was made with another robot, TCP or payload.
+            DeviceError: the camera's images have another size than the set's.
+        """
+        check_identity(self.papers.calibration.hand_eye.robot, station.identity,
                        self.papers.sources["hand_eye"])
+        wanted = self.papers.calibration.sensor.image_size
+        if station.image_size != wanted:
+            raise DeviceError("its images have {} x {} px; ".format(*station.image_size)
+                              + "the active set was made with {} x {} px".format(*wanted),
+                              device="camera")
 
 
 def prepare(job: Path, cell: str | None = None) -> Prepared:

@@ -139,7 +139,7 @@ def _open_station(jobs: dict[str, Prepared], request: ShiftRequest,
     station = closing.enter_context(
         open_station(first.papers.station, first.folder, request.speed))
     for prepared in jobs.values():
-        prepared.check_identity(station.identity)
+        prepared.check_devices(station)
     return station
 
 
