@@ -74,6 +74,7 @@ class GateSet(Document):
     camera: dict[str, Gate]
     light_plane: dict[str, Gate]
     hand_eye: dict[str, Gate]
+    sphere: dict[str, Gate]
     body: dict[str, Gate]
     drift_mm: dict[Literal["warn", "act", "stop"], Number]
 
