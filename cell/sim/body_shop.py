@@ -32,8 +32,14 @@ class BodyShop:
         """Build body `number` (0, 1, 2, ...)."""
         seed = self.scene.seed + 7919 * (number + 1)
         faults = self._faults(np.random.default_rng([seed, *b"faults"]))
-        off = {hole: self._fault_off(hole, fault) for hole, fault in faults.items()}
+        off = self._as_designed() | {hole: self._fault_off(hole, fault)
+                                     for hole, fault in faults.items()}
         return Built(number, Delivery(seed, shifts=self._drift(number), off=off), faults)
+
+    def _as_designed(self) -> dict[str, tuple[float, float, float]]:
+        """Take back what puts holes of the scene off: the first body has it, and the master."""
+        return {hole.id: _three(np.negative(hole.off)) for hole in self.scene.holes
+                if any(hole.off)}
 
     def _drift(self, number: int) -> dict[str, tuple[float, float, float]]:
         """Tools wear: each panel wanders its own way, and jumps back when the tool is changed."""
@@ -53,9 +59,10 @@ class BodyShop:
 
     def _fault_off(self, hole: str, fault: str) -> tuple[float, float, float]:
         """Say by how much (u, v, diameter) a fault puts a hole off, mm."""
-        radius = next(entry.radius for entry in self.scene.holes if entry.id == hole)
-        return {"diameter": (0.0, 0.0, 0.5), "position": (2.4, -1.9, 0.0),
-                "missing": (0.0, 0.0, -4.0 * radius)}[fault]
+        entry = next(entry for entry in self.scene.holes if entry.id == hole)
+        off = {"diameter": (0.0, 0.0, 0.5), "position": (2.4, -1.9, 0.0),
+               "missing": (0.0, 0.0, -4.0 * entry.radius)}[fault]
+        return _three(np.subtract(off, entry.off))
 
 
 def _three(values: Array) -> tuple[float, float, float]:
