@@ -36,7 +36,7 @@ class CameraModel:
         x, y = _parts(normalised)
         x_d, y_d, *_ = _distort(x, y, self.distortion)
         k = self.matrix
-        return np.stack([k[0, 0] * x_d + k[0, 1] * y_d + k[0, 2], k[1, 1] * y_d + k[1, 2]], axis=-1)
+        return _pairs(k[0, 0] * x_d + k[0, 1] * y_d + k[0, 2], k[1, 1] * y_d + k[1, 2])
 
     def normalise(self, pixels: ArrayLike) -> Array:
         """Undistort pixels (..., 2) to normalised coordinates (..., 2): the ray is (x, y, 1).
@@ -55,36 +55,46 @@ class CameraModel:
             y = y - (f_x * g - g_x * f) / determinant
             if max(np.abs(f).max(initial=0.0), np.abs(g).max(initial=0.0)) < ALMOST:
                 break
-        return np.stack([x, y], axis=-1)
+        return _pairs(x, y)
 
     def pixel_by_normalised(self, normalised: ArrayLike) -> Array:
         """Differentiate pixels by normalised coordinates (..., 2): matrices (..., 2, 2)."""
         x, y = _parts(normalised)
         _, _, f_x, f_y, g_x, g_y = _distort(x, y, self.distortion)
-        rows = np.stack([np.stack([f_x, f_y], axis=-1), np.stack([g_x, g_y], axis=-1)], axis=-2)
+        rows = np.empty((*x.shape, 2, 2))
+        rows[..., 0, 0], rows[..., 0, 1], rows[..., 1, 0], rows[..., 1, 1] = f_x, f_y, g_x, g_y
         return self.matrix[:2, :2] @ rows
 
     def pixel_by_intrinsics(self, normalised: ArrayLike) -> Array:
         """Differentiate pixels by fx, fy, cx, cy, k1, k2, p1, p2, k3: matrices (..., 2, 9)."""
         x, y = _parts(normalised)
         x_d, y_d, *_ = _distort(x, y, self.distortion)
-        r2, xy, none, one = x * x + y * y, 2.0 * x * y, np.zeros_like(x), np.ones_like(x)
-        linear = np.stack([np.stack([x_d, none, one, none], axis=-1),
-                           np.stack([none, y_d, none, one], axis=-1)], axis=-2)
-        lens = np.stack([np.stack([x * r2, x * r2**2, xy, r2 + 2 * x * x, x * r2**3], axis=-1),
-                         np.stack([y * r2, y * r2**2, r2 + 2 * y * y, xy, y * r2**3], axis=-1)],
-                        axis=-2)
-        return np.concatenate([linear, self.matrix[:2, :2] @ lens], axis=-1)
+        r2, xy = x * x + y * y, 2.0 * x * y
+        matrices = np.zeros((*x.shape, 2, 9))
+        matrices[..., 0, 0], matrices[..., 1, 1] = x_d, y_d
+        matrices[..., 0, 2] = matrices[..., 1, 3] = 1.0
+        lens = np.stack([x * r2, x * r2**2, xy, r2 + 2 * x * x, x * r2**3,
+                         y * r2, y * r2**2, r2 + 2 * y * y, xy, y * r2**3], axis=-1)
+        matrices[..., 4:] = self.matrix[:2, :2] @ lens.reshape(*x.shape, 2, 5)
+        return matrices
 
     def rays(self, pixels: ArrayLike) -> Array:
         """Undistort pixels (..., 2) to rays (..., 3) with z = 1."""
         normalised = self.normalise(pixels)
-        return np.concatenate([normalised, np.ones((*normalised.shape[:-1], 1))], axis=-1)
+        rays = np.ones((*normalised.shape[:-1], 3))
+        rays[..., :2] = normalised
+        return rays
 
 
 def _parts(pairs: ArrayLike) -> tuple[Array, Array]:
     both = np.asarray(pairs, dtype=np.float64)
     return both[..., 0], both[..., 1]
+
+
+def _pairs(first: Array, second: Array) -> Array:
+    both = np.empty((*first.shape, 2))
+    both[..., 0], both[..., 1] = first, second
+    return both
 
 
 def _distort(x: Array, y: Array, distortion: Array) -> tuple[Array, ...]:

@@ -63,8 +63,11 @@ class Ellipse:
 
         The columns are centre x and y and the elements 00, 01 and 11 of the shape.
         """
-        (cos, sin), (n_x, n_y) = _circle(t).T, self.normals(t).T
-        return np.stack([n_x, n_y, n_x * cos, n_x * sin + n_y * cos, n_y * sin], axis=-1)
+        (cos, sin), normals = _circle(t).T, self.normals(t)
+        rows, (n_x, n_y) = np.empty((len(t), 5)), normals.T
+        rows[:, :2], rows[:, 2], rows[:, 4] = normals, n_x * cos, n_y * sin
+        rows[:, 3] = n_x * sin + n_y * cos
+        return rows
 
     def moved(self, step: Array) -> Ellipse:
         """Move by the five numbers of `design`."""
@@ -87,7 +90,9 @@ def project_circle(camera: CameraModel, centre: Array, normal: Array, radius: fl
 
 
 def _circle(t: Array) -> Array:
-    return np.stack([np.cos(t), np.sin(t)], axis=-1)
+    both = np.empty((len(t), 2))
+    both[:, 0], both[:, 1] = np.cos(t), np.sin(t)
+    return both
 
 
 ROUND = _circle(np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False))

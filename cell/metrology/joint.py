@@ -17,7 +17,7 @@ import numpy as np
 from cell.core.documents.result import Located
 from cell.core.geometry import Array, Plane, Transform, cross
 from cell.core.optics import SensorModel
-from cell.metrology.conic import circle_centre_ray, fit_conic
+from cell.metrology.conic import circle_centre_ray
 from cell.metrology.features import Expected, Rim, Stripe
 from cell.metrology.joint_problem import Prior, Problem
 from cell.metrology.joint_rows import Circle, Sight, StripeSight
@@ -82,7 +82,7 @@ def _start(rim: Sight, stripes: Sequence[StripeSight], expected: Expected) -> Ci
     normal = SQUARE if expected.normal is None else np.asarray(expected.normal, dtype=np.float64)
     normal = -normal * np.sign(normal @ on_sheet) / np.linalg.norm(normal)
     plane = Plane.through(on_sheet, normal)
-    centre = plane.meet(circle_centre_ray(fit_conic(rim.rays[:, :2]), normal))
+    centre = plane.meet(circle_centre_ray(rim.conic, normal))
     radius = float(np.linalg.norm(plane.meet(rim.rays) - centre, axis=1).mean())
     none = np.zeros(2)
     return Circle(centre, normal, _tangents(normal, stripes[0]), none, radius, none,

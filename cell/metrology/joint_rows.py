@@ -21,6 +21,7 @@ import numpy as np
 
 from cell.core.geometry import Array, Plane, Transform
 from cell.core.optics import CameraModel, SensorModel
+from cell.metrology.conic import fit_conic
 from cell.metrology.features import Rim, Stripe
 
 SMALLEST_BIAS = 1e-4  # px: a prior needs a width
@@ -84,6 +85,11 @@ class Sight:
         rays = camera.rays(features.points)
         by_pixel = np.asarray(np.linalg.inv(camera.pixel_by_normalised(rays[:, :2])), np.float64)
         return cls(rays, by_pixel, features.sigma, max(1.0, features.correlation))
+
+    @cached_property
+    def conic(self) -> Array:
+        """The conic (3, 3) through the points, in normalised coordinates."""
+        return fit_conic(self.rays[:, :2])
 
     def pixel_gradient(self, by_ray: Array) -> tuple[Array, Array]:
         """Turn derivatives (n, 3) by the ray into mm per px (n,) and unit directions (n, 2)."""

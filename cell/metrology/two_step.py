@@ -22,7 +22,7 @@ import numpy as np
 from cell.core.documents.result import Located
 from cell.core.geometry import Array, Plane, Transform
 from cell.core.optics import SensorModel
-from cell.metrology.conic import chord, ellipse_centre, fit_conic, fit_line
+from cell.metrology.conic import chord, ellipse_centre, fit_line
 from cell.metrology.features import Expected, Rim, Stripe
 from cell.metrology.joint import normal_sigma, solve_seen
 from cell.metrology.joint_rows import Sight, StripeSight
@@ -78,7 +78,7 @@ def locate_two_step(rim: Rim, stripe: Stripe, sensor: SensorModel, expected: Exp
         UnmeasurableError: not enough points, no ellipse, or the stripe misses the hole.
     """
     sight, crossing = Sight.of(rim, sensor.camera), StripeSight.of(stripe, sensor, UNMOVED)
-    conic, line = fit_conic(sight.rays[:, :2]), fit_line(crossing.sight.rays[:, :2])
+    conic, line = sight.conic, fit_line(crossing.sight.rays[:, :2])
     solved = solve_two_step(conic, line, sensor.light_plane)
     held = replace(expected, normal_sigma=HELD)
     solution = solve_seen(rim, sight, (crossing,), held).solutions[0]
