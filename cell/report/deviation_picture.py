@@ -42,7 +42,8 @@ def _draw_side(axes: Axes, features: Sequence[Feature], holes: dict[str, Hole],
     axes.scatter(at[:, 0], at[:, 1], s=26, c=colours, zorder=3, edgecolors="white", linewidths=0.6)
     arrows = axes.quiver(at[:, 0], at[:, 1], shift[:, 0], shift[:, 1], color=colours,
                          angles="xy", scale_units="xy", scale=1.0 / scale, width=0.005, zorder=2)
-    axes.quiverkey(arrows, 0.85, 1.03, typical, f"{typical:.2f} mm", labelpos="E",
+    axes.update_datalim(at + scale * shift)  # or the longest arrow would leave the picture
+    axes.quiverkey(arrows, 0.78, 1.03, typical, f"{typical:.2f} mm", labelpos="E",
                    fontproperties={"size": 8})
     for feature, place in zip(features, at, strict=True):
         if feature.verdict != "in_tolerance":
