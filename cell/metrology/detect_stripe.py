@@ -37,10 +37,10 @@ class Cut:
 
 def detect_stripe(image: Image, rim: Rim, camera: CameraModel, light_plane: Plane,
                   expected: Expected) -> Stripe:
-    """Locate the stripe on the sheet beside the hole.
+    """Locate the stripe on the sheet beside a hole that is known; it need not cross it.
 
     Raises:
-        UnmeasurableError: there is no stripe, it misses the hole, or its two sides disagree.
+        UnmeasurableError: there is no stripe, too little of it, or its two sides disagree.
     """
     ridges = find_ridges(image, upright=runs_upright(light_plane))
     if not ridges:
@@ -119,9 +119,7 @@ def _lines_beside(image: Image, ridge: Ridge, hole: Ellipse,
     length, width = image.shape if ridge.upright else image.shape[::-1]
     v = np.arange(length, dtype=np.float64)
     reach = hole.reach(ridge.points(length))
-    if not (reach < 1.0).any():
-        raise refusal("laser_misses_hole")
-    inside = v[reach < 1.0]
+    inside = v[reach < max(1.0, float(reach.min()) + 1e-9)]  # or the line that comes nearest
     beyond = np.maximum(inside[0] - v, v - inside[-1])
     clear = (reach - 1.0) * hole.radius > reaches[0]
     u = ridge.across(v)

@@ -12,16 +12,20 @@ from cell.core.documents.nominals import Hole
 from cell.core.errors import UnmeasurableError
 from cell.core.geometry import Transform
 from cell.core.observation import Observation, View
+from cell.core.optics import SensorModel
 from cell.metrology.body_frame import expect, reached
 from cell.metrology.detect_pair import detect_pair
 from cell.metrology.detect_stripe import detect_stripe
 from cell.metrology.ellipse import project_circle
 from cell.metrology.features import Expected, Rim, Stripe
 from cell.metrology.joint import Shot, solve_circle
+from cell.metrology.joint_rows import Circle
 from cell.metrology.reasons import refusal
 
 STILL_MM, STILL_RAD = 0.05, np.radians(0.02)  # an arm that stands is far quieter
 NEARBY = 0.3  # of an arm's error is what two poses a few millimetres apart do not share
+BESIDE = ("laser_misses_hole", "hole_cut_by_border")  # the stripe may lie on the sheet all the same
+ON_SHEET = 1.0  # mm off its plane, which a wrong normal explains
 ELSEWHERE = 0.5  # mm: pictures from one place share their speckle, so that one stripe is enough
 
 
@@ -29,7 +33,7 @@ ELSEWHERE = 0.5  # mm: pictures from one place share their speckle, so that one 
 class Sighting:
     """A pair of views of one attempt, and what was detected in it. `index` is the place of the ring
     view among the observation's views, `base_from_flange` where the arm stood then, and `others`
-    are the attempt's further laser views.
+    are further laser views: the attempt's own, and those of attempts that missed the hole.
     """
 
     index: int
@@ -49,23 +53,29 @@ def see(observation: Observation, hole: Hole, calibration: Calibration,
         UnmeasurableError: no attempt shows both; with the reason of the newest.
     """
     found: list[Sighting] = []
+    beside: tuple[View, ...] = ()
     refused: UnmeasurableError | None = None
     for attempt in sorted({view.attempt for view in observation.views}, reverse=True):
         try:
             found.append(_see(observation, attempt, hole, calibration, normal_sigma))
         except UnmeasurableError as error:
             refused = refused or error
+            beside += _lasers(observation, attempt) if error.reason in BESIDE else ()
     if not found:
         raise refused or refusal("no_hole", "there is no view")
-    return found
+    return [replace(found[0], others=found[0].others + beside), *found[1:]]
+
+
+def _lasers(observation: Observation, attempt: int) -> tuple[View, ...]:
+    return tuple(view for view in observation.views
+                 if view.attempt == attempt and view.light == "laser")
 
 
 def _see(observation: Observation, attempt: int, hole: Hole, calibration: Calibration,
          normal_sigma: float) -> Sighting:
     index, ring = _last(observation, attempt)
     base_from_flange = reached(ring, calibration.kinematics)
-    lasers = sorted((view for view in observation.views
-                     if view.attempt == attempt and view.light == "laser"),
+    lasers = sorted(_lasers(observation, attempt),
                     key=lambda view: ring.base_from_flange_after.distance(
                         view.base_from_flange_before))
     if not lasers:
@@ -125,8 +135,15 @@ def _strays(sighting: Sighting, shots: list[Shot], calibration: Calibration,
             with suppress(UnmeasurableError):  # a stripe that misses adds nothing
                 stripe = detect_stripe(view.image, rim, sensor.camera, sensor.light_plane,
                                        reference.expected)
-                found.append((_loosened(stripe, calibration), pose))
+                if _on_sheet(stripe, pose, circle, sensor):
+                    found.append((_loosened(stripe, calibration), pose))
     return found
+
+
+def _on_sheet(stripe: Stripe, pose: Transform, circle: Circle, sensor: SensorModel) -> bool:
+    """Tell whether a stripe lies on the sheet of the hole, and not on another behind it."""
+    points = pose @ sensor.light_plane.meet(sensor.camera.rays(stripe.points))
+    return bool(np.median(np.abs((points - circle.centre) @ circle.normal)) < ON_SHEET)
 
 
 def _camera_from(reference: Sighting, laser: View, calibration: Calibration) -> Transform:

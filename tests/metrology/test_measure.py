@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_observations import BASE_FROM_BODY, FLANGE_FROM_CAMERA, Sight, made_calibration
-from made_pairs import draw_scene
+from made_pairs import SENSOR, draw_scene
 
 from cell.core.documents.result import Measured, NotMeasured
 from cell.core.geometry import Transform
@@ -114,6 +114,36 @@ def test_a_laser_view_of_its_own_joins_in(sight, views):
     two = measure(sight, sight.observe((*views, aside)))
     assert np.linalg.norm(two.centre - sight.centre_in_body) < 0.02
     assert two.located.covariance[2, 2] < one.located.covariance[2, 2]
+
+
+def missed_and_again(sight):
+    rng, plane = np.random.default_rng(25), SENSOR.light_plane
+    beside = plane.normal * (plane.distance(sight.scene.centre) - 5.6)
+    return (sight.attempt(rng, camera_shift=beside),
+            sight.attempt(rng, number=1, camera_shift=(0.6, -0.3, 0.2)))
+
+
+def test_a_first_stripe_that_missed_the_hole_joins_in_all_the_same(sight):
+    missed, again = missed_and_again(sight)
+    first = measure(sight, sight.observe(missed))
+    assert isinstance(first, NotMeasured)
+    assert first.reason == "laser_misses_hole"
+    alone, both = (measure(sight, sight.observe(*seen)) for seen in ((again,), (missed, again)))
+    assert both.reference == 2
+    assert within(both, sight.centre_in_body)
+    assert np.linalg.norm(both.centre - sight.centre_in_body) < 0.02
+    assert both.located.covariance[2, 2] < alone.located.covariance[2, 2]
+    assert max(both.budget["normal_prior"][:3]) < 0.7 * max(alone.budget["normal_prior"][:3])
+
+
+def test_a_stripe_that_lies_off_the_sheet_does_not_join_in(sight):
+    missed, again = missed_and_again(sight)
+    away = Transform.from_parts(np.zeros(3), 3.0 * (BASE_FROM_BODY.turn(sight.normal_in_body)))
+    deeper = tuple(replace(view, base_from_flange_before=away @ view.base_from_flange_before,
+                           base_from_flange_after=away @ view.base_from_flange_after)
+                   for view in missed)
+    alone, both = (measure(sight, sight.observe(*seen)) for seen in ((again,), (deeper, again)))
+    assert both.centre == pytest.approx(alone.centre, abs=1e-12)
 
 
 def test_an_older_attempt_counts_where_the_newest_shows_nothing(sight, views):
