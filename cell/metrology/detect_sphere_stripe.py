@@ -15,7 +15,7 @@ from cell.metrology.ridge import runs_upright
 from cell.metrology.stripe_centres import HALF_WINDOW, centre_stripe
 
 SMOOTH = 1.5        # px
-REACH = 8.0         # mm around the sphere that are looked at: so rough its place may be
+REACH = 12.0        # mm around the sphere that are looked at: so rough its place may be
 FAINT = 0.3         # of the stripe's usual height: at the sphere's edge the light grazes
 DIM = 12.0          # grey, below which nothing is a stripe
 CLIPPED = 250       # grey, from which a stripe has lost its summit

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from made_operator import Scripted
-from made_scenes import demo_world
+from made_scenes import demo_scene, demo_world
 
 from cell.archive.activation import history
 from cell.archive.files import read_text
@@ -23,7 +23,7 @@ from cell.programs.calibration.solve import solve_session
 from cell.programs.calibration.wizard import Request, conclude, run_wizard
 
 ROOT = Path(__file__).parents[2]
-PLAN = CalibrationPlan(views=12, hold_out=3, reason="a trial")
+PLAN = CalibrationPlan(views=12, hold_out=3, sphere_views=6, reason="a trial")
 pytestmark = pytest.mark.timeout(400)
 
 
@@ -86,8 +86,18 @@ def test_every_view_is_on_the_disk_when_it_is_told(plant, cut_off):
 def test_it_goes_on_where_it_was_cut_off(finished):
     done, operator = finished
     assert operator.heard("8 views are there")
-    assert not operator.heard("01/15") and operator.heard("15/15")
-    assert len({view.number for view in Session.read(done.session).views}) == 15
+    assert not operator.heard("01/21") and operator.heard("21/21")
+    assert len({view.number for view in Session.read(done.session).views}) == 21
+
+
+def test_the_sphere_checks_the_way_through_the_laser(plant, finished):
+    solution = finished[0].solution
+    gates = {gate.name: gate for gate in solution.gates["sphere"]}
+    assert gates["poses"].value == 6 and gates["spread_mm"].value < 0.15
+    assert gates["radius_off_mm"].verdict == "pass"
+    assert solution.sphere.centre == pytest.approx(demo_scene().spheres[0].centre, abs=0.4)
+    report = read_text(plant / "demo" / "sets" / finished[0].set_id / "report.html")
+    assert "the poses disagree about the sphere" in report
 
 
 def test_the_set_is_better_than_what_it_began_with(plant, finished):

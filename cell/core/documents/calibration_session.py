@@ -10,10 +10,10 @@ from pydantic import Field
 from cell.core.documents.base import Document, Matrix4, Number, Vector6
 from cell.core.documents.calibration import RobotRecord
 from cell.core.documents.station import NotNegative, Positive
-from cell.core.documents.targets import BoardDocument
+from cell.core.documents.targets import BoardDocument, SphereDocument
 from cell.core.geometry import Transform
 
-Purpose = Literal["start", "fit", "hold_out"]
+Purpose = Literal["start", "fit", "hold_out", "sphere"]
 
 
 class CalibrationPlan(Document):
@@ -22,12 +22,15 @@ class CalibrationPlan(Document):
     `goal_mm` is the predicted uncertainty of a point at which capturing may stop early. `reason`
     is recorded where a warning is accepted; without one, warnings are not accepted unattended.
     `kinematics` has the arm's own rows estimated too, where views kept apart gain by it.
+    `sphere_views` look at the cell's sphere in the end, a check that nothing is fitted to; 0 leaves
+    it out.
     """
 
     operator: str = "unattended"
     board: str | None = None
     views: Annotated[int, Field(ge=6, le=80)] = 20
     hold_out: Annotated[int, Field(ge=0, le=10)] = 5
+    sphere_views: Annotated[int, Field(ge=0, le=20)] = 8
     goal_mm: Positive = 0.06
     early_stop: bool = True
     lean_deg: Positive = 32.0
@@ -51,6 +54,7 @@ class SessionHeader(Document):
     robot: RobotRecord
     sensor_serial: str | None
     board: BoardDocument
+    sphere: SphereDocument | None = None
     plan: CalibrationPlan
     base_from_board: Matrix4
     targets: tuple[tuple[Purpose, Vector6], ...]  # joints in rad, in the order of capture

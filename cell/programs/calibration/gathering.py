@@ -18,6 +18,7 @@ from cell.programs.calibration.capture import Shots, as_rows, as_six, drive, rec
 from cell.programs.calibration.poses import free_path
 from cell.programs.calibration.seen import SeenView, see_view
 from cell.programs.calibration.session import Session
+from cell.programs.calibration.sphere import see_sphere
 from cell.programs.station import Station
 
 TRIES = 3
@@ -87,6 +88,19 @@ class Gathering:
         self._tell(f"{number:02}/{self._last} skipped: {status}")
 
     def _keep(self, shots: Shots, number: int, purpose: Purpose) -> None:
+        if purpose == "sphere":
+            self._keep_sphere(shots, number)
+        else:
+            self._keep_board(shots, number, purpose)
+
+    def _keep_sphere(self, shots: Shots, number: int) -> None:
+        assert self.session.header.sphere is not None
+        look = see_sphere(shots.stripe.image, shots.ring.base_from_flange_before,
+                          self.session.header.sphere, self.belief)
+        record(self.session, number, "sphere", shots, 0, "ok")
+        self._tell(f"{number:02}/{self._last} ok sphere   {len(look.pixels)} points of the stripe")
+
+    def _keep_board(self, shots: Shots, number: int, purpose: Purpose) -> None:
         view = self._see(shots, number, purpose)
         record(self.session, number, purpose, shots, len(view.board.pixels), "ok")
         before = after = self.predicted()

@@ -8,17 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from cell.core.documents.calibration_session import CalibrationPlan, Purpose
+from cell.core.documents.targets import SphereDocument
 from cell.core.errors import DocumentError
 from cell.core.geometry import Transform
 from cell.core.ports import Joints
 from cell.metrology.detect_board import BoardDesign
 from cell.metrology.hand_eye import HandEyeProblem, HandEyeView
 from cell.metrology.pose_planning import plan_views, predict_point_sigma
+from cell.metrology.sphere_views import draw_sphere_views
 from cell.metrology.view_candidates import Spread, draw_candidates, predict_board
 from cell.metrology.way import Leg, check_leg
 from cell.programs.calibration.belief import Belief
 
 CANDIDATES = 140
+SPHERE_CANDIDATES = 60
 CORNER_SIGMA = 0.05  # px, of a board in focus
 
 
@@ -75,6 +78,25 @@ def plan_poses(belief: Belief, plan: CalibrationPlan, design: BoardDesign,
     targets: list[tuple[Purpose, Joints]] = [("fit", _of(reached, index)) for index in order]
     targets += [("hold_out", _of(reached, index)) for index in apart]
     return PlannedViews(tuple(targets), predicted)
+
+
+def plan_sphere(belief: Belief, sphere: SphereDocument, start: Joints,
+                count: int) -> tuple[Joints, ...]:
+    """Choose joints that look at a sphere, every move to and from the start view free.
+
+    Raises:
+        DocumentError: too few are.
+    """
+    drawn = draw_sphere_views(SPHERE_CANDIDATES, belief.sensor, np.array(sphere.centre),
+                              sphere.radius_mm)
+    poses = [pose @ belief.flange_from_camera.inverse for pose in drawn]
+    found = [belief.arm.closest(pose, start) for pose in poses]
+    free = [joints for joints in found if joints and not _problems(belief, start, joints)]
+    if len(free) < count:
+        raise DocumentError(f"the sphere {sphere.id} can be looked at from {len(free)} sides; "
+                            f"{count} are wanted: move it, or plan fewer `sphere_views`",
+                            source=str(belief.folder / "targets.yaml"))
+    return tuple(free[:count])
 
 
 def free_path(belief: Belief, here: Joints, there: Joints, safe: Joints) -> list[Joints]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from cell.core.errors import DocumentError, UnmeasurableError
-from cell.core.optics import CameraModel
+from cell.core.optics import CameraModel, SensorModel
 from cell.metrology.board_pose import locate_boards
 from cell.metrology.calibration_gates import Checked, GateSet, Ruling, check_gates, worst
 from cell.metrology.camera_calibration import TILTED, CameraResult, solve_camera
@@ -16,12 +16,15 @@ from cell.metrology.hand_eye_calibration import HandEyeAnswer, calibrate_hand_ey
 from cell.metrology.hand_eye_session import HandEyeSession
 from cell.metrology.light_plane import LightPlaneResult, StripeOnBoard, solve_light_plane
 from cell.metrology.motions import stack
+from cell.metrology.sphere import SphereResult
 from cell.programs.calibration.belief import Belief, design_of
 from cell.programs.calibration.kinematics import KinematicsFound, find_kinematics
 from cell.programs.calibration.recorded import read_gates
 from cell.programs.calibration.seen import SeenView, see_view
 from cell.programs.calibration.session import Session
+from cell.programs.calibration.sphere import check_sphere, see_sphere
 
+STEPS = ("camera", "light plane", "laser path", "sphere")  # hand-eye gives its own reasons
 DEPTH = 44.0  # mm over which a light plane should have been seen: the depth of field
 
 
@@ -38,6 +41,7 @@ class Solution:
     light_plane: LightPlaneResult | None = None
     hand_eye: HandEyeAnswer | None = None
     kinematics: KinematicsFound | None = None
+    sphere: SphereResult | None = None
     gates: dict[str, tuple[Checked, ...]] = field(default_factory=dict)
 
     @property
@@ -50,7 +54,7 @@ class Solution:
     @property
     def reasons(self) -> tuple[str, ...]:
         """What speaks against it, step by step."""
-        camera_and_plane = [f"{step}: {gate}" for step in ("camera", "light plane", "laser path")
+        camera_and_plane = [f"{step}: {gate}" for step in STEPS
                             for gate in self.gates.get(step, ()) if gate.verdict != "pass"]
         return (*camera_and_plane, *(() if self.hand_eye is None else self.hand_eye.reasons))
 
@@ -97,11 +101,28 @@ def _solve(views: tuple[SeenView, ...], session: Session, belief: Belief,
         checks["hand-eye"] = answer.gates
     found = (find_kinematics(views, camera, answer, belief)
              if session.header.plan.kinematics and answer else None)
-    solution = Solution(views, camera, camera_result, plane, answer, found, checks)
+    solution = Solution(views, camera, camera_result, plane, answer, found, gates=checks)
     missed = laser_path_rms(solution, belief)
     if not np.isnan(missed):
         checks["laser path"] = check_gates({"laser_path_mm": missed}, gates.hand_eye)
-    return solution
+    return _with_sphere(solution, session, belief, gates)
+
+
+def _with_sphere(solution: Solution, session: Session, belief: Belief,
+                 gates: GateSet) -> Solution:
+    """Check what was solved on the sphere, where the session has one."""
+    sphere, answer = session.header.sphere, solution.hand_eye
+    if sphere is None:
+        return solution
+    plane = solution.light_plane.plane if solution.light_plane else belief.sensor.light_plane
+    mount = (answer.held_out.result.carrier_from_camera if answer and answer.held_out
+             else belief.flange_from_camera)
+    size = belief.sensor.camera.image_size
+    looks = [see_sphere(session.read_image(view.stripe, size), view.pose, sphere, belief)
+             for view in session.views if view.status == "ok" and view.purpose == "sphere"]
+    check = check_sphere(looks, sphere, SensorModel(solution.camera, plane), mount, gates.sphere)
+    return replace(solution, sphere=check.result,
+                   gates=solution.gates | {"sphere": check.gates})
 
 
 def _plane(views: Sequence[SeenView], camera: CameraModel) -> LightPlaneResult:

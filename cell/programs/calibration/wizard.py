@@ -27,9 +27,10 @@ from cell.programs.calibration.belief import Belief, design_of, read_belief
 from cell.programs.calibration.capture import as_rows, as_six, drive, shoot
 from cell.programs.calibration.gathering import Gathering
 from cell.programs.calibration.make_set import Signature, make_set
-from cell.programs.calibration.poses import free_path, plan_poses, plan_start
+from cell.programs.calibration.poses import free_path, plan_poses, plan_sphere, plan_start
 from cell.programs.calibration.session import Session, latest_session
 from cell.programs.calibration.solve import Solution, board_shift, solve_session
+from cell.programs.calibration.sphere import choose_sphere
 from cell.programs.station import Station, open_station
 
 What = Literal["camera", "light-plane", "hand-eye", "all"]
@@ -122,15 +123,20 @@ def _begin(request: Request, belief: Belief, station: Station, operator: Operato
     place, start = _start_view(belief, board, station, operator)
     operator.tell("planning the views ...")
     planned = plan_poses(belief, request.plan, design_of(board), place, start)
-    _agree(operator, f"{len(planned.targets)} views are planned, all moves checked; predicted "
-                     f"uncertainty {planned.predicted:.3f} mm. Drive them at half speed?")
+    sphere = None if request.what == "camera" else choose_sphere(request.plan, belief, operator)
+    over = plan_sphere(belief, sphere, start, request.plan.sphere_views) if sphere else ()
+    _agree(operator, f"{len(planned.targets)} views are planned and {len(over)} of the sphere, all "
+                     f"moves checked; predicted uncertainty {planned.predicted:.3f} mm. Drive them "
+                     "at half speed?")
     header = SessionHeader(
         cell=belief.folder.name, what=request.what, begun=_now("%Y-%m-%dT%H:%M:%SZ"),
         base_set=belief.set_id, robot=_robot(station.identity),
-        sensor_serial=belief.sensor_document.serial, board=board, plan=request.plan,
+        sensor_serial=belief.sensor_document.serial, board=board, sphere=sphere,
+        plan=request.plan,
         base_from_board=as_rows(place),
         targets=(("start", as_six(start)),
-                 *((purpose, as_six(joints)) for purpose, joints in planned.targets)))
+                 *((purpose, as_six(joints)) for purpose, joints in planned.targets),
+                 *(("sphere", as_six(joints)) for joints in over)))
     name = f"{_now('%Y-%m-%dT%H%M%SZ')}-{request.what}"
     return Session.begin(belief.folder / "sessions" / name, header)
 
@@ -142,7 +148,8 @@ def _resume(what: What, belief: Belief, station: Station, operator: Operator) ->
         raise DocumentError("robot or active set have changed since this session began: begin "
                             "again", source=str(session.folder))
     check_identity(header.robot, station.identity, str(session.folder))
-    used = [view for view in session.views if view.status == "ok"]
+    used = [view for view in session.views
+            if view.status == "ok" and view.purpose != "sphere"]
     operator.tell(f"going on with {session.folder.name}: {len(used)} views are there")
     if used:
         _check_old_view(used[-1], session, belief, station)
