@@ -49,17 +49,20 @@ def body(job: Path = typer.Argument(..., help="The job whose master body is in t
 
 def check(cell: str = CELL, calibration: Path = FOLDER, yes: bool = YES, speed: float = SPEED,
           as_json: bool = JSON) -> None:
-    """Look at the cell's boards again: have robot, sensor or fixture wandered since the set?
+    """Look at the cell's boards and spheres again: have robot, sensor or fixture wandered?
 
     The first check of a set is its reference. The moving average warns at 0.05 mm, asks for a
-    correction at 0.10 and stops at 0.20; nothing is corrected by itself.
+    correction at 0.10 and stops at 0.20; nothing is corrected by itself. A sphere of known radius
+    is measured through the laser as well, and held against gates of its own.
 
-    Exit code: 0 good or first, 1 act, stop or repeat, 2 bad input, 3 device fault.
+    Exit code: 0 good or first, 1 act, stop, repeat or refused, 2 bad input, 3 device fault.
     """
     from cell.programs.calibration.check import CheckRequest, check_cell
 
     done = check_cell(CheckRequest(cell, calibration, speed=speed), _operator(yes))
     alarm = "reference" if done.drift is None else done.drift.alarm
+    for gate in done.gates:
+        console.print(f"{gate.verdict:6} {gate}", highlight=False)
     if as_json:
         drift = done.drift
         print_json({"alarm": alarm, "places": done.places,
@@ -67,6 +70,7 @@ def check(cell: str = CELL, calibration: Path = FOLDER, yes: bool = YES, speed: 
                     "average_mm": None if drift is None else drift.average,
                     "left_over_mm": None if drift is None else drift.left_over,
                     "correctable": None if drift is None else drift.correctable,
+                    "gates": [vars(gate) for gate in done.gates],
                     "joint_temperatures_c": list(done.temperatures)})
     elif done.drift is None:
         answers.print("the first check of this set: it is the reference from now on")
@@ -74,7 +78,8 @@ def check(cell: str = CELL, calibration: Path = FOLDER, yes: bool = YES, speed: 
         size = float(np.linalg.norm(done.drift.average))
         answers.print(f"{alarm}: moving average {size:.3f} mm, left over after the rigid part "
                       f"{done.drift.left_over:.3f} mm", highlight=False)
-    raise typer.Exit(ACCEPTED if alarm in ("reference", "ok", "warn") else REFUSED)
+    good = alarm in ("reference", "ok", "warn") and not done.refused
+    raise typer.Exit(ACCEPTED if good else REFUSED)
 
 
 def _operator(yes: bool) -> Operator:

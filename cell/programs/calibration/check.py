@@ -1,4 +1,4 @@
-"""The check between calibrations: the fixed boards again, against where this set saw them first."""
+"""The check between calibrations: fixed boards and spheres, against where they were first seen."""
 
 from __future__ import annotations
 
@@ -14,21 +14,23 @@ import numpy as np
 from cell.archive.files import read_text
 from cell.core.documents.calibration_session import CalibrationPlan
 from cell.core.documents.papers import check_identity
-from cell.core.documents.targets import BoardDocument
+from cell.core.documents.targets import BoardDocument, SphereDocument
 from cell.core.errors import DocumentError, UnmeasurableError
 from cell.core.geometry import Array
 from cell.core.ports import Operator
 from cell.metrology.board_pose import locate_boards
-from cell.metrology.calibration_gates import Level
+from cell.metrology.calibration_gates import Checked, Level, worst
 from cell.metrology.detect_board import detect_board
 from cell.metrology.drift import Drift, judge_drift
 from cell.programs.calibration.belief import Belief, design_of, read_belief
 from cell.programs.calibration.capture import drive, shoot
-from cell.programs.calibration.poses import free_path, plan_poses, plan_start
+from cell.programs.calibration.poses import free_path, plan_poses, plan_sphere, plan_start
 from cell.programs.calibration.recorded import read_gates
+from cell.programs.calibration.sphere import SphereCheck, SphereLook, check_sphere, see_sphere
 from cell.programs.station import Station, open_station
 
 LOG = "drift/log.jsonl"
+SPHERE_VIEWS = 8
 VIEWS = CalibrationPlan(views=6, hold_out=0, lean_deg=20.0)
 
 
@@ -49,31 +51,44 @@ class CheckedCell:
     drift: Drift | None
     places: dict[str, Array]
     temperatures: tuple[float, ...]
+    gates: tuple[Checked, ...] = ()
+
+    @property
+    def refused(self) -> bool:
+        """Whether a sphere is beyond its gates."""
+        return worst(gate.verdict for gate in self.gates) == "refuse"
 
 
 def check_cell(request: CheckRequest, operator: Operator) -> CheckedCell:
-    """Look at every board of the cell, and judge how far it has wandered since the set was made.
+    """Look at every board and sphere of the cell: how far has it wandered since the set was made?
 
-    The first check of a set becomes its reference. Every check is one line of `drift/log.jsonl`,
-    with the joints' temperatures.
+    The spheres go the way of every measurement, through the laser, and have gates of their own. The
+    first check of a set becomes its reference. Every check is one line of `drift/log.jsonl`, with
+    the joints' temperatures.
 
     Raises:
         DocumentError: a paper is wrong, no board was seen, or the operator said no.
         DeviceError: a device failed.
     """
     belief = read_belief(request.calibration, request.cell)
-    if not operator.confirm("The arm will look at the boards. Is the way clear?"):
+    if not operator.confirm("The arm will look at the boards and spheres. Is the way clear?"):
         raise DocumentError("stopped by the operator")
     with open_station(belief.station, belief.folder, request.speed) as station:
         check_identity(belief.hand_eye.robot, station.identity, f"set {belief.set_id}")
         places: dict[str, Array] = {}
         for board in belief.targets.boards:
             places |= _place(board, belief, station, operator)
+        checks = [_check_sphere(sphere, belief, station, operator, request.gates)
+                  for sphere in belief.targets.spheres]
         temperatures = station.robot.state().temperatures
+    places |= {f"{sphere.id} centre": check.result.centre
+               for sphere, check in zip(belief.targets.spheres, checks, strict=True)
+               if check.result is not None}
     past = _past(belief)
     drift = _judge(places, past, request.gates) if past else None
     _log(belief, places, drift, temperatures)
-    return CheckedCell(drift, places, temperatures)
+    return CheckedCell(drift, places, temperatures,
+                       tuple(gate for check in checks for gate in check.gates))
 
 
 def _place(board: BoardDocument, belief: Belief, station: Station,
@@ -98,6 +113,29 @@ def _place(board: BoardDocument, belief: Belief, station: Station,
         raise DocumentError(f"the board {board.id} was not seen", source=belief.station.name)
     corners = np.mean(seen, axis=0)
     return {f"{board.id} corner {index}": corners[index] for index in range(len(corners))}
+
+
+def _check_sphere(sphere: SphereDocument, belief: Belief, station: Station, operator: Operator,
+                  gates: Level) -> SphereCheck:
+    """Measure the centre of a sphere in the base, by the stripe, from several sides."""
+    start = station.robot.state().joints
+    looks = []
+    for joints in (*plan_sphere(belief, sphere, start, SPHERE_VIEWS), start):
+        drive(station, free_path(belief, station.robot.state().joints, joints, start))
+        if joints is not start:
+            looks += _look(sphere, belief, station, operator)
+    return check_sphere(looks, sphere, belief.sensor, belief.flange_from_camera,
+                        read_gates().level(gates).sphere)
+
+
+def _look(sphere: SphereDocument, belief: Belief, station: Station,
+          operator: Operator) -> list[SphereLook]:
+    view = shoot(station).stripe
+    try:
+        return [see_sphere(view.image, view.base_from_flange_before, sphere, belief)]
+    except UnmeasurableError as error:
+        operator.tell(f"{sphere.id}: {error.detail}")
+        return []
 
 
 def _judge(places: dict[str, Array], past: list[dict[str, Any]], gates: Level) -> Drift:
