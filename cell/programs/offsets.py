@@ -100,14 +100,14 @@ def _read(log: Path) -> Recorded:
     pages = [_without_images(page) for page in read_pages(log)]
     start, stop = pages[0].record, pages[-1].record
     records = [page.record for page in pages if isinstance(page.record, HoleRecord)]
+    status = stop.status if isinstance(stop, Stop) else "died"
     chain = check_chain(seal, pages[-1].chain, len(records),
-                        [fault for page in pages for fault in page.faults])
+                        [fault for page in pages for fault in page.faults], status)
     if not chain.passed:
         raise DocumentError(f"not as it was recorded: {chain.words}", source=str(log))
     assert isinstance(start, Start)  # `read_pages` sees to it
-    if not isinstance(stop, Stop) or stop.status != "complete":
-        status = f"was {stop.status}" if isinstance(stop, Stop) else "died"
-        raise DocumentError(f"expected a complete run; this one {status}", source=str(log))
+    if status != "complete":
+        raise DocumentError(f"expected a complete run; this one was {status}", source=str(log))
     papers = Papers.parse(start.papers, start.set_id)
     return Recorded(log, start, papers, judge_master_run(papers, start, records))
 

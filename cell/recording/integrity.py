@@ -12,6 +12,8 @@ from cell.core.errors import DocumentError
 from cell.recording.keys import is_signed_by, key_id, parse_public_key
 from cell.recording.seal import Seal, read_seal, reference, seal_path
 
+COPIES = ("repaired", "pruned")  # seals of copies name what was done to them
+
 
 @dataclass(frozen=True)
 class Check:
@@ -40,8 +42,17 @@ def check_seal(log: Path, trusted: Collection[str] = ()) -> tuple[Seal | None, l
     return seal, [_check_file(log, seal), _check_signature(seal, trusted), _check_link(log, seal)]
 
 
-def check_chain(seal: Seal | None, head: str, holes: int, faults: Sequence[str]) -> Check:
-    """Check what was recomputed from the content against what was written and sealed."""
+def check_chain(seal: Seal | None, head: str, holes: int, faults: Sequence[str],
+                status: str) -> Check:
+    """Check what was recomputed from the content against what was written and sealed.
+
+    Args:
+        seal: the recording's seal, if it has one.
+        head: the last link of the chain as recomputed.
+        holes: whole holes found.
+        faults: what is not as it was written.
+        status: how the run ended, by its stop record.
+    """
     if faults:
         return Check("chain", False, "; ".join(faults))
     if seal is None:
@@ -49,6 +60,8 @@ def check_chain(seal: Seal | None, head: str, holes: int, faults: Sequence[str])
                                     "says that they are all")
     if (seal.chain, seal.holes) != (head, holes):
         return Check("chain", False, f"the seal closes {seal.holes} holes and another content")
+    if seal.status not in (status, *COPIES):
+        return Check("chain", False, f"the run ended {status}; the seal says {seal.status}")
     return Check("chain", True, f"start, {holes} holes and end follow from each other")
 
 

@@ -61,6 +61,7 @@ class Recorder:
             self._hand_over(self._write_start, start, waiting=0)
         except BaseException:
             self._close()
+            path.unlink(missing_ok=True)  # nothing has been seen yet: nothing is lost
             raise
 
     def write_hole(self, record: HoleRecord) -> None:

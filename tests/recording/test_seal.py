@@ -46,7 +46,8 @@ def test_a_fresh_recording_passes_every_level(tmp_path, papers, key):
     assert verdicts(second, [key]) == {"file": True, "signature": True, "link": True}
     assert read_seal(seal_path(second)).previous.file == "a.rrd.seal.json"
     seal, back = read_seal(seal_path(second)), read(second)
-    assert check_chain(seal, back.head, len(back.holes), back.faults).passed
+    assert check_chain(seal, back.head, len(back.holes), back.faults, back.status).passed
+    assert not check_chain(seal, back.head, len(back.holes), back.faults, "fault").passed
     assert check_images(back.missing).passed
 
 

@@ -103,10 +103,11 @@ class _Audit:
             self._tally(compare("body", recorded, then))
         if recorded is None and self._what_if:
             recorded = as_recorded(judge_run(self._papers, self._start, self._recorded))
-        chain = check_chain(seal, self._page.chain, len(self._recorded), self._faults)
+        status = "died" if self._stop is None else self._stop.status
+        chain = check_chain(seal, self._page.chain, len(self._recorded), self._faults, status)
         return LogAudit(
             log, None if chain.passed else f"not intact: {chain.words}", self._start.body_id,
-            self._start.started, "died" if self._stop is None else self._stop.status,
+            self._start.started, status,
             self._page.chain, len(self._recorded),
             (*checks, chain, check_images(self._missing)), self._numbers,
             tuple(self._differences), _versions_that_differ(self._start), tuple(self._warnings),
