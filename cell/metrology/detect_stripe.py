@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import cv2
 import numpy as np
 
 from cell.core.geometry import Array, Plane
@@ -15,24 +12,14 @@ from cell.metrology.features import Expected, Rim, Stripe
 from cell.metrology.reasons import refusal
 from cell.metrology.ridge import Ridge, find_ridges, runs_upright
 from cell.metrology.spread import correlation_length, robust_sigma, tukey_weights
+from cell.metrology.stripe_centres import HALF_WINDOW, centre_stripe
 
 DIE_ROLL = 0.7      # mm beside the rim, where a sheet of unknown thickness bends into the hole
 LENGTH = 12.0       # mm of stripe used on either side: the sheet is flat as far as that
-HALF_WINDOW = 10    # px across the stripe: four standard deviations of a wide one
-FLOOR = 0.2         # of the stripe's height, below which nothing counts towards its centre
 LARGEST_GAP = 0.4   # px between the two sides, beyond what their noise allows
 LEAST_LINES = 8     # on either side
 DEEP = 0.95         # of the radius, from which on a stripe counts as inside
 LEAST_GAP = 0.3     # of the chord, on which the stripe has to be gone
-
-
-@dataclass(frozen=True, eq=False)
-class Cut:
-    """The image across the stripe: `grey` (n, m) over its background, at `u` (n, m), `v` (n,)."""
-
-    grey: Array
-    u: Array
-    v: Array
 
 
 def detect_stripe(image: Image, rim: Rim, camera: CameraModel, light_plane: Plane,
@@ -55,12 +42,11 @@ def follow_stripe(image: Image, ridge: Ridge, rim: Rim, sensor: SensorModel,
     """Locate a stripe that was found as a whole, line by line."""
     hole = _hole(rim)
     v, side = _lines_beside(image, ridge, hole, _reaches(ridge, hole, sensor, expected))
-    cut = _cut(image, ridge, v)
-    u, height = _centres(cut)
+    _check_length(side)
+    u, height = centre_stripe(image, ridge, v)
     bright = height > 0.3 * np.median(height)
     points, side = ridge.pixels(u[bright], v[bright]), side[bright]
-    if min((side < 0).sum(), (side > 0).sum()) < LEAST_LINES:
-        raise refusal("stripe_too_short")
+    _check_length(side)
     miss, scale = _straightness(points, sensor.camera, ridge.upright)
     good = np.abs(miss) < 3.5 * scale
     sigma, correlation = robust_sigma(miss[good]), correlation_length(miss[good])
@@ -69,6 +55,11 @@ def follow_stripe(image: Image, ridge: Ridge, rim: Rim, sensor: SensorModel,
         raise refusal("stripe_segments_disagree", f"they are {gap:.1f} px apart")
     return Stripe(points=points[good], side=side[good], sigma=sigma, correlation=correlation,
                   quality={"height": ridge.height, "gap_px": gap, "share": ridge.share})
+
+
+def _check_length(side: Array) -> None:
+    if min((side < 0).sum(), (side > 0).sum()) < LEAST_LINES:
+        raise refusal("stripe_too_short")
 
 
 def _gap(along: Array, miss: Array, side: Array) -> tuple[float, float]:
@@ -126,24 +117,6 @@ def _lines_beside(image: Image, ridge: Ridge, hole: Ellipse,
     seen = (u > HALF_WINDOW + 1) & (u < width - HALF_WINDOW - 2)
     use = clear & seen & (beyond < reaches[1])
     return v[use], np.where(v[use] < inside[0], -1.0, 1.0)
-
-
-def _cut(image: Image, ridge: Ridge, v: Array) -> Cut:
-    turned = image if ridge.upright else image.T
-    u = np.rint(ridge.across(v)).astype(np.intp)[:, None] + np.arange(-HALF_WINDOW, HALF_WINDOW + 1)
-    grey = turned[v.astype(np.intp)[:, None], u].astype(np.float64)
-    left, right = (cv2.blur(np.median(part, axis=1).reshape(-1, 1), (1, 15))
-                   for part in (grey[:, :4], grey[:, -4:]))
-    ramp = np.linspace(0.0, 1.0, grey.shape[1])
-    return Cut(grey - left * (1.0 - ramp) - right * ramp, u.astype(np.float64), v)
-
-
-def _centres(cut: Cut) -> tuple[Array, Array]:
-    """Give the centre of mass (n,) across the stripe, and its height, line by line."""
-    height = cut.grey.max(axis=1)
-    weight = np.clip(cut.grey - FLOOR * height[:, None], 0.0, None)
-    total = np.maximum(weight.sum(axis=1), 1e-9)
-    return (weight * cut.u).sum(axis=1) / total, height
 
 
 def _straightness(points: Array, camera: CameraModel, upright: bool) -> tuple[Array, float]:
