@@ -90,6 +90,7 @@ def run_bodies(folder, bodies, show, seed=3):
 def _check(folder, bodies):
     gauge, before = Gauge(), time.monotonic()
     threads, files = threading.active_count(), gauge.process.num_fds()
+    children = set(gauge.process.children())
     database, plc, shift, settled = run_bodies(folder, bodies, gauge.show)
     took = time.monotonic() - before
     rows = Ledger(database, "demo", "soak").rows(visits)
@@ -101,8 +102,8 @@ def _check(folder, bodies):
     assert [r.sequence for r in plc.received] == [row["sequence"] for row in rows]
     assert [r.body.body_id for r in plc.received] == [row["body_id"] for row in rows]
     assert {row["recovered_by"] for row in struck} <= {"line"}
-    assert (threading.active_count(), gauge.process.num_fds()) == (threads, files)
-    assert gauge.process.children() == []
+    assert threading.active_count() <= threads and gauge.process.num_fds() <= files
+    assert set(gauge.process.children()) <= children
     return gauge, took, rows, struck
 
 
