@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import typer
@@ -14,6 +14,7 @@ from cell.cli.words import answers, console, print_json
 
 if TYPE_CHECKING:
     from cell.core.ports import Operator
+    from cell.programs.calibration.check import CheckedCell
 
 ACCEPTED, REFUSED = 0, 1
 YES = typer.Option(False, "--yes", help="Ask nobody: everything that was planned is agreed to.")
@@ -48,6 +49,9 @@ def body(job: Path = typer.Argument(..., help="The job whose master body is in t
 
 
 def check(cell: str = CELL, calibration: Path = FOLDER, yes: bool = YES, speed: float = SPEED,
+          correct: bool = typer.Option(False, "--correct", help="Take the drift back in the body "
+                                       "registrations: at most 0.3 mm and 0.03 degrees, logged, "
+                                       "the registrations before it kept."),
           as_json: bool = JSON) -> None:
     """Look at the cell's boards and spheres again: have robot, sensor or fixture wandered?
 
@@ -59,27 +63,37 @@ def check(cell: str = CELL, calibration: Path = FOLDER, yes: bool = YES, speed: 
     """
     from cell.programs.calibration.check import CheckRequest, check_cell
 
-    done = check_cell(CheckRequest(cell, calibration, speed=speed), _operator(yes))
-    alarm = "reference" if done.drift is None else done.drift.alarm
+    done = check_cell(CheckRequest(cell, calibration, speed=speed, correct=correct),
+                      _operator(yes))
     for gate in done.gates:
         console.print(f"{gate.verdict:6} {gate}", highlight=False)
     if as_json:
-        drift = done.drift
-        print_json({"alarm": alarm, "places": done.places,
-                    "shifts_mm": None if drift is None else dict(drift.shifts),
-                    "average_mm": None if drift is None else drift.average,
-                    "left_over_mm": None if drift is None else drift.left_over,
-                    "correctable": None if drift is None else drift.correctable,
-                    "gates": [vars(gate) for gate in done.gates],
-                    "joint_temperatures_c": list(done.temperatures)})
-    elif done.drift is None:
-        answers.print("the first check of this set: it is the reference from now on")
+        print_json(_as_json(done))
     else:
-        size = float(np.linalg.norm(done.drift.average))
-        answers.print(f"{alarm}: moving average {size:.3f} mm, left over after the rigid part "
-                      f"{done.drift.left_over:.3f} mm", highlight=False)
-    good = alarm in ("reference", "ok", "warn") and not done.refused
-    raise typer.Exit(ACCEPTED if good else REFUSED)
+        answers.print(_in_words(done), highlight=False)
+    good = done.corrected or done.alarm in ("reference", "ok", "warn")
+    raise typer.Exit(ACCEPTED if good and not done.refused else REFUSED)
+
+
+def _as_json(done: CheckedCell) -> dict[str, Any]:
+    drift = done.drift
+    return {"alarm": done.alarm, "places": done.places,
+            "shifts_mm": None if drift is None else dict(drift.shifts),
+            "average_mm": None if drift is None else drift.average,
+            "left_over_mm": None if drift is None else drift.left_over,
+            "correctable": None if drift is None else drift.correctable,
+            "corrected": done.corrected,
+            "gates": [vars(gate) for gate in done.gates],
+            "joint_temperatures_c": list(done.temperatures)}
+
+
+def _in_words(done: CheckedCell) -> str:
+    if done.drift is None:
+        return "the first check of this set: it is the reference from now on"
+    size = float(np.linalg.norm(done.drift.average))
+    taken = "; corrected, the registrations carry it from now on" if done.corrected else ""
+    return (f"{done.alarm}: moving average {size:.3f} mm, left over after the rigid part "
+            f"{done.drift.left_over:.3f} mm{taken}")
 
 
 def _operator(yes: bool) -> Operator:

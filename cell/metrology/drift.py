@@ -22,6 +22,7 @@ Alarm: TypeAlias = Literal["ok", "warn", "act", "stop", "repeat"]
 WEIGHT = 0.2             # of the newest reading in the average
 SINGLE = 0.18            # mm: a single reading beyond three standard deviations is repeated first
 MOST_SHIFT_MM, MOST_TURN_DEG = 0.3, 0.03  # that a correction may ever be
+WIDE = 200.0             # mm between artefacts, below which they tell a shift but hardly a turn
 BENT = 0.10              # mm left over after the rigid part: no correction, calibrate again
 
 
@@ -43,9 +44,13 @@ class Drift:
     @property
     def correctable(self) -> bool:
         """Whether the rigid part may be applied on request: small, and nothing bends."""
-        millimetres, radians = self.reference_from_now.distance(Transform.identity())
-        return (millimetres <= MOST_SHIFT_MM and np.degrees(radians) <= MOST_TURN_DEG
-                and self.left_over <= BENT)
+        return is_small(self.reference_from_now) and self.left_over <= BENT
+
+
+def is_small(correction: Transform) -> bool:
+    """Tell whether a correction is within what one may ever be."""
+    millimetres, radians = correction.distance(Transform.identity())
+    return millimetres <= MOST_SHIFT_MM and float(np.degrees(radians)) <= MOST_TURN_DEG
 
 
 def judge_drift(reference: Mapping[str, Array], now: Mapping[str, Array],
@@ -87,7 +92,9 @@ def _alarm(mean: Array, average: Array, averages: Sequence[Array],
 
 
 def _rigid(now: Array, before: Array) -> Transform:
-    """With three artefacts and more shift and turn, with fewer the shift alone."""
-    if len(now) >= 3:
+    """With three artefacts and more, far apart, shift and turn; else the shift alone: a turn from
+    artefacts close together would be carried far beyond them.
+    """
+    if len(now) >= 3 and np.ptp(before, axis=0).max() >= WIDE:
         return lay_onto(now, before)
     return Transform.from_parts(np.eye(3), (before - now).mean(axis=0))

@@ -123,9 +123,14 @@ class HandEyeDocument(Document):
 
 
 class BodyDocument(Document):
-    """`body/<job>.yaml`: where the body's axes lie in the robot's base, as the fixture holds it."""
+    """`body/<job>.yaml`: where the body's axes lie in the robot's base, as the fixture holds it.
+
+    `base_from_body` is as registered. `drift_correction` carries what was measured then to where
+    the same is measured now; it is only ever set on request.
+    """
 
     base_from_body: Matrix4
+    drift_correction: Matrix4 | None = None
     calibration_set: str | None = None
     covariance: PoseCovariance | None = None
     datums: tuple[str, ...] = ()
@@ -188,8 +193,11 @@ class Calibration:
 
     @cached_property
     def base_from_body(self) -> Transform:
-        """The body registration."""
-        return Transform(np.array(self.body.base_from_body))
+        """The body registration, with the correction of drift where there is one."""
+        registered = Transform(np.array(self.body.base_from_body))
+        if self.body.drift_correction is None:
+            return registered
+        return Transform(np.array(self.body.drift_correction)) @ registered
 
     @property
     def flange_sigmas(self) -> tuple[float, float]:

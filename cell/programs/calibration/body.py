@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from cell.archive.files import replace_text
 from cell.archive.papers import read_papers
 from cell.core.documents.calibration import BodyDocument
 from cell.core.documents.nominals import Hole
@@ -23,7 +21,9 @@ from cell.metrology.calibration_gates import Checked, Level, Ruling, check_gates
 from cell.metrology.datum import Datum, Registration, UndeterminedError, solve_body_registration
 from cell.metrology.plan import PlannedStop
 from cell.programs.calibration.capture import as_rows
+from cell.programs.calibration.drift_log import REGISTERED, append_line
 from cell.programs.calibration.recorded import read_gates
+from cell.programs.calibration.registrations import write_registration
 from cell.programs.inspection.chase import Chase
 from cell.programs.inspection.drive import Driver
 from cell.programs.inspection.prepare import Prepared, prepare_papers
@@ -162,7 +162,7 @@ def body_figures(registration: Registration, holes: tuple[Hole, ...]) -> dict[st
 
 
 def _write(registration: Registration, prepared: Prepared, datums: list[Datum]) -> Path:
-    """Replace the registration in one step; the one before is kept beside it."""
+    """Replace the registration; drift counts from here, so the next check is a new reference."""
     job = prepared.papers.job.name
     file = prepared.folder / "body" / f"{job}.yaml"
     rows = registration.covariance_of_measured_from_body
@@ -171,10 +171,6 @@ def _write(registration: Registration, prepared: Prepared, datums: list[Datum]) 
         calibration_set=prepared.papers.set_id,
         covariance=tuple(tuple(float(value) for value in row) for row in rows),  # type: ignore[arg-type]
         datums=tuple(datum.id for datum in datums))
-    if file.exists():
-        past = file.parent / "history"
-        past.mkdir(exist_ok=True)
-        now = datetime.now(UTC).strftime("%Y-%m-%dT%H%M%SZ")
-        replace_text(past / f"{job}-until-{now}.yaml", file.read_text("utf-8"))
-    replace_text(file, dump(document))
+    append_line(prepared.folder, prepared.papers.set_id, {"alarm": REGISTERED, "job": job})
+    write_registration(file, document)
     return file

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import json
-import os
-from dataclasses import dataclass
-from datetime import UTC, datetime
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cell.archive.files import read_text
 from cell.core.documents.calibration_session import CalibrationPlan
 from cell.core.documents.papers import check_identity
 from cell.core.documents.targets import BoardDocument, SphereDocument
 from cell.core.errors import DocumentError, UnmeasurableError
-from cell.core.geometry import Array
+from cell.core.geometry import Array, Transform
 from cell.core.ports import Operator
 from cell.metrology.board_pose import locate_boards
 from cell.metrology.calibration_gates import Checked, Level, worst
@@ -24,12 +20,13 @@ from cell.metrology.detect_board import detect_board
 from cell.metrology.drift import Drift, judge_drift
 from cell.programs.calibration.belief import Belief, design_of, read_belief
 from cell.programs.calibration.capture import drive, shoot
+from cell.programs.calibration.drift_log import CORRECTED, append_line, read_past
 from cell.programs.calibration.poses import free_path, plan_poses, plan_sphere, plan_start
 from cell.programs.calibration.recorded import read_gates
+from cell.programs.calibration.registrations import apply_corrections, plan_corrections
 from cell.programs.calibration.sphere import SphereCheck, SphereLook, check_sphere, see_sphere
 from cell.programs.station import Station, open_station
 
-LOG = "drift/log.jsonl"
 SPHERE_VIEWS = 8
 VIEWS = CalibrationPlan(views=6, hold_out=0, lean_deg=20.0)
 
@@ -42,6 +39,7 @@ class CheckRequest:
     calibration: Path = Path("calibration")
     gates: Level = "fine"
     speed: float = 1.0
+    correct: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +50,12 @@ class CheckedCell:
     places: dict[str, Array]
     temperatures: tuple[float, ...]
     gates: tuple[Checked, ...] = ()
+    corrected: bool = False
+
+    @property
+    def alarm(self) -> str:
+        """What the moving average calls for; `reference` for the first check."""
+        return "reference" if self.drift is None else self.drift.alarm
 
     @property
     def refused(self) -> bool:
@@ -84,11 +88,13 @@ def check_cell(request: CheckRequest, operator: Operator) -> CheckedCell:
     places |= {f"{sphere.id} centre": check.result.centre
                for sphere, check in zip(belief.targets.spheres, checks, strict=True)
                if check.result is not None}
-    past = _past(belief)
+    past = read_past(belief.folder, belief.set_id)
+    apply_corrections(belief.folder, past[0].get("corrections", {}) if past else {})
     drift = _judge(places, past, request.gates) if past else None
-    _log(belief, places, drift, temperatures)
-    return CheckedCell(drift, places, temperatures,
-                       tuple(gate for check in checks for gate in check.gates))
+    checked = CheckedCell(drift, places, temperatures,
+                          tuple(gate for check in checks for gate in check.gates))
+    _log(belief, checked)
+    return replace(checked, corrected=request.correct and _correct(belief, checked, operator))
 
 
 def _place(board: BoardDocument, belief: Belief, station: Station,
@@ -145,28 +151,37 @@ def _judge(places: dict[str, Array], past: list[dict[str, Any]], gates: Level) -
     return judge_drift(reference, places, averages, {str(k): v for k, v in limits.items()})
 
 
-def _past(belief: Belief) -> list[dict[str, Any]]:
-    """The checks of the active set, oldest first; a last line that was cut short does not count."""
-    file = belief.folder / LOG
-    lines = read_text(file).splitlines() if file.exists() else []
-    whole = [json.loads(line) for line in lines if line.startswith("{") and line.endswith("}")]
-    return [line for line in whole if line["set"] == belief.set_id]
+def _log(belief: Belief, checked: CheckedCell) -> None:
+    drift = checked.drift
+    append_line(belief.folder, belief.set_id, {
+        "alarm": checked.alarm, **_measured(checked),
+        "average": None if drift is None else drift.average.tolist(),
+        "left_over_mm": None if drift is None else drift.left_over})
 
 
-def _log(belief: Belief, places: dict[str, Array], drift: Drift | None,
-         temperatures: tuple[float, ...]) -> None:
-    file = belief.folder / LOG
-    line = {"at": datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"), "set": belief.set_id,
-            "places": {name: place.tolist() for name, place in places.items()},
-            "average": None if drift is None else drift.average.tolist(),
-            "alarm": "reference" if drift is None else drift.alarm,
-            "left_over_mm": None if drift is None else drift.left_over,
-            "joint_temperatures_c": list(temperatures)}
-    try:
-        file.parent.mkdir(exist_ok=True)
-        with file.open("a", encoding="utf-8") as stream:
-            stream.write(json.dumps(line) + "\n")
-            stream.flush()
-            os.fsync(stream.fileno())
-    except OSError as error:
-        raise DocumentError(f"cannot be written: {error.strerror}", source=str(file)) from None
+def _measured(checked: CheckedCell) -> dict[str, Any]:
+    return {"places": {name: place.tolist() for name, place in checked.places.items()},
+            "joint_temperatures_c": list(checked.temperatures)}
+
+
+def _correct(belief: Belief, checked: CheckedCell, operator: Operator) -> bool:
+    """Take the rigid part of a drift back in the body registrations, if it may be and is agreed to.
+
+    The log's line comes first: a check that finds it but not all registrations finishes the work.
+    """
+    drift = checked.drift
+    if drift is None or drift.alarm == "repeat" or not drift.correctable:
+        operator.tell("Not corrected: " + ("there is no reference yet." if drift is None else
+                      "check again first." if drift.alarm == "repeat" else
+                      "beyond 0.3 mm or 0.03 degrees, or it bends: calibrate again."))
+        return False
+    corrections = plan_corrections(belief.folder, belief.set_id, drift.reference_from_now.inverse)
+    shift, turn = drift.reference_from_now.distance(Transform.identity())
+    if not operator.confirm(f"Correct the registrations of {', '.join(corrections) or 'nothing'} "
+                            f"by {shift:.3f} mm and {np.degrees(turn):.4f} degrees?"):
+        return False
+    append_line(belief.folder, belief.set_id, {
+        "alarm": CORRECTED, **_measured(checked), "average": None, "left_over_mm": drift.left_over,
+        "corrections": corrections})
+    apply_corrections(belief.folder, corrections)
+    return True
