@@ -17,9 +17,9 @@ class Books:
 
     def __init__(self, own: Database, plant: str | None, logs: Path) -> None:
         """Begin to write; `plant` is a database's URL."""
-        self._own, self._plant, self._away = Writer(own), None, None
-        if plant is not None:
-            self._away = connect(plant)
+        self._away = None if plant is None else connect(plant)  # may refuse: before any thread
+        self._own, self._plant = Writer(own), None
+        if self._away is not None:
             self._plant = Writer(self._away)
             self._plant.submit(partial(prepare, source=str(self._away)))
             self._plant.submit(partial(book_missing, logs=logs))
