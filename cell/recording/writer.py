@@ -27,8 +27,8 @@ from cell.recording.stream import Stream
 ROOM = 200e6
 """Bytes that must be free before a body: some 300 holes."""
 
-WAITING = 8
-"""Holes that may wait for the disk before `write_hole` waits too: this bounds the memory."""
+WAITING = 1
+"""Holes that may wait for the disk before `write_hole` waits too: this bounds what a kill costs."""
 
 
 class Show(Protocol):
