@@ -13,7 +13,9 @@ import pytest
 
 # The same examples every time, and no judgement of the machine: a red run means a fault.
 hypothesis.settings.register_profile("house", deadline=None, derandomize=True,
-                                     suppress_health_check=list(hypothesis.HealthCheck))
+                                     suppress_health_check=[
+                                         hypothesis.HealthCheck.too_slow,
+                                         hypothesis.HealthCheck.filter_too_much])
 hypothesis.settings.load_profile("house")
 
 ROOT = Path(__file__).parents[1]

@@ -59,16 +59,17 @@ def test_station_time_over_its_unavoidable_part(tmp_path: Path, capsys, monkeypa
         inspection.go_home()
         whole = time.perf_counter() - begun
         inspection.finish("complete")
-        robot = station.document.robot  # the ring light rises while the arm settles, the laser not
-        settled = len(prepared.stops) * (robot.settle_s + robot.light_rise_s)
+        robot, stops = station.document.robot, len(prepared.stops)
+        settled, risen = stops * robot.settle_s, stops * robot.light_rise_s
     unavoidable = watch.seconds["motion"] + watch.seconds["exposure"] + settled
     with capsys.disabled():
         print(f"\nstation time {whole:.1f} s, of it motion {watch.seconds['motion']:.1f}, "
-              f"settling of arm and laser {settled:.1f}, exposure {watch.seconds['exposure']:.1f}; "
+              f"settling {settled:.1f}, exposure {watch.seconds['exposure']:.1f}; "
               f"the rest {whole - unavoidable:.2f} s: pose readings "
               f"{watch.seconds['pose readings']:.2f}, lights on {watch.seconds['lights on']:.2f}, "
               f"off {watch.seconds['lights off']:.2f}")
-        print(f"ratio to the unavoidable part {whole / unavoidable:.3f} (asked: below 1.05)")
+        print(f"ratio to the unavoidable part {whole / unavoidable:.3f} (asked: below 1.05); "
+              f"{whole / (unavoidable + risen):.3f} if the laser's rise counts as settling too")
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         print(f"peak memory of this process {peak:.0f} MB (asked: below 600)")
     assert whole / unavoidable < 1.5
