@@ -94,7 +94,10 @@ class Lights(Protocol):
     """The ring light and the laser. The laser burns only between `set("laser")` and `off()`."""
 
     def set(self, light: Light | None) -> None:
-        """Switch exactly this light on and the other off, and wait until read back and risen."""
+        """Switch exactly this light on and the other off, and wait until read back.
+
+        Its lamp may need longer to rise: `light_rise_s` of the cell's file.
+        """
 
     def off(self) -> None:
         """Switch both off. Never raises: it is called on every way out."""

@@ -6,8 +6,6 @@ that is what switches the laser off when this software cannot.
 
 from __future__ import annotations
 
-import time
-
 from cell.core.documents.station import RobotSettings
 from cell.core.errors import DeviceError
 from cell.core.observation import Light
@@ -21,13 +19,10 @@ class UrLights:
         self._robot = robot
         self._outputs: dict[Light, int] = {"ring": settings.digital_output_ring,
                                            "laser": settings.digital_output_laser}
-        self._rise = settings.light_rise_s / robot.speed
 
     def set(self, light: Light | None) -> None:
-        """Switch exactly this light on and the other off, and wait until read back and risen."""
+        """Switch exactly this light on and the other off, and wait until read back."""
         self._robot.set_outputs({output: name == light for name, output in self._outputs.items()})
-        if light is not None:
-            time.sleep(self._rise)
 
     def off(self) -> None:
         """Switch both off, if need be by ending the program on the controller. Never raises."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,7 +11,7 @@ from cell.core.geometry import Transform
 from cell.core.observation import View
 from cell.core.ports import Joints, Move
 from cell.programs.calibration.session import Session
-from cell.programs.inspection.look import take_view
+from cell.programs.inspection.look import look
 from cell.programs.station import Station
 
 SLOW = 0.5  # of the cell's speed: nobody is in a hurry
@@ -50,15 +49,8 @@ def shoot(station: Station) -> Shots:
         DeviceError: robot, lights or camera failed; the lights are off.
     """
     camera = station.document.camera
-    try:
-        arrived = time.monotonic()
-        station.lights.set("ring")
-        station.pause(station.document.robot.settle_s, since=arrived)
-        ring = take_view(station, "ring", camera.exposure_ring_s, 0)
-        station.lights.set("laser")
-        return Shots(ring, take_view(station, "laser", camera.exposure_laser_s, 0))
-    finally:
-        station.lights.off()
+    return Shots(*look(station, {"ring": camera.exposure_ring_s,
+                                 "laser": camera.exposure_laser_s}, attempt=0))
 
 
 def record(session: Session, number: int, purpose: Purpose, shots: Shots,

@@ -16,7 +16,7 @@ from cell.metrology.measure import measure_hole
 from cell.metrology.next_look import NextLook, decide_next
 from cell.metrology.plan import PlannedStop
 from cell.programs.inspection.drive import Driver, Stand
-from cell.programs.inspection.look import take_view
+from cell.programs.inspection.look import look
 from cell.programs.inspection.prepare import Prepared
 from cell.programs.station import Station
 
@@ -58,7 +58,7 @@ class Chase:
                                          "laser": camera.exposure_laser_s}
         attempts: list[Attempt] = []
         while True:
-            views = self._look(exposures, len(attempts))
+            views = look(self._station, exposures, len(attempts))
             observation = observation.with_views(views)
             outcome = self._measure(observation, stop)
             following = self._decide(observation, outcome, stop)
@@ -68,22 +68,6 @@ class Chase:
             exposures = {light: exposure * following.exposure_factor[light]
                          for light, exposure in exposures.items()}
             self._step_aside(stop, views[-1], following)
-
-    def _look(self, exposures: dict[Light, float], attempt: int) -> tuple[View, ...]:
-        """Let the arm settle under the ring light, and take both pictures.
-
-        The laser burns no longer than it is used.
-        """
-        station = self._station
-        try:
-            arrived = time.monotonic()
-            station.lights.set("ring")
-            station.pause(station.document.robot.settle_s, since=arrived)
-            ring = take_view(station, "ring", exposures["ring"], attempt)
-            station.lights.set("laser")
-            return ring, take_view(station, "laser", exposures["laser"], attempt)
-        finally:
-            station.lights.off()
 
     def _measure(self, observation: Observation, stop: PlannedStop) -> Outcome:
         papers = self._prepared.papers

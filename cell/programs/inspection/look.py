@@ -1,50 +1,87 @@
-"""One view of a hole: pose, exposure, pose."""
+"""One look at a hole: both pictures from one place, with the pose read round each exposure."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 
 from cell.core.observation import Image, Light, View
 from cell.core.ports import CameraTimeoutError
 from cell.programs.station import Station
 
-TRIES = 3  # exposures for one view: the arm stands, so another costs only time
+TRIES = 3  # exposures for one look: the arm stands, so another costs only time
 
 
-def take_view(station: Station, light: Light, exposure: float, attempt: int) -> View:
-    """Expose once for `exposure` seconds under `light`, which is on, between two readings of the
-    pose.
+def look(station: Station, exposures: Mapping[Light, float], attempt: int) -> tuple[View, View]:
+    """Let the arm settle under the ring light, and take the hole's and the stripe's picture.
 
-    A view during which the arm moved is taken again; if it goes on moving, the last view is
-    returned as it is, and measuring refuses it.
+    The pose is read before, between and after the exposures. If the arm moved meanwhile both
+    pictures are taken again; if it goes on moving, the last ones are returned as they are, and
+    measuring refuses them. The laser burns no longer than it is used.
+
+    Args:
+        station: the open devices; the arm has just arrived.
+        exposures: exposure time by light, s.
+        attempt: the how-manieth look at this hole.
+
+    Returns:
+        The view under the ring light and the view under the laser.
 
     Raises:
-        DeviceError: robot, lights or camera failed.
+        DeviceError: robot, lights or camera failed; the lights are off.
     """
-    view = _expose(station, light, exposure, attempt)
-    for _ in range(TRIES - 1):
-        if _stood_still(station, view):
-            break
-        view = _expose(station, light, exposure, attempt)
-    return view
+    arrived = time.monotonic()
+    try:
+        pair = _take_both(station, exposures, attempt, arrived)
+        for _ in range(TRIES - 1):
+            if all(_stood_still(station, view) for view in pair):
+                break
+            pair = _take_both(station, exposures, attempt, arrived)
+        return pair
+    finally:
+        station.lights.off()
 
 
-def _expose(station: Station, light: Light, exposure: float, attempt: int) -> View:
+def _take_both(station: Station, exposures: Mapping[Light, float], attempt: int,
+               arrived: float) -> tuple[View, View]:
+    """Take both pictures. The laser rises while the pose between them is read."""
+    lit = _light_up(station, "ring")
+    station.pause(station.document.robot.settle_s, since=arrived)
+    _let_rise(station, lit)
     before = station.robot.state()
-    moment = time.time()
-    image = _snap(station, exposure)
+    hole, hole_time = _snap(station, exposures["ring"])
+    lit = _light_up(station, "laser")
+    between = station.robot.state()
+    _let_rise(station, lit)
+    stripe, stripe_time = _snap(station, exposures["laser"])
     after = station.robot.state()
-    return View(image, light, exposure, moment, before.base_from_flange, after.base_from_flange,
-                before.joints, attempt)
+    return (View(hole, "ring", exposures["ring"], hole_time, before.base_from_flange,
+                 between.base_from_flange, before.joints, attempt),
+            View(stripe, "laser", exposures["laser"], stripe_time, between.base_from_flange,
+                 after.base_from_flange, between.joints, attempt))
 
 
-def _snap(station: Station, exposure: float) -> Image:
-    for _ in range(TRIES - 1):
+def _light_up(station: Station, light: Light) -> float:
+    """Switch a light on and return when it was seen to be switched."""
+    station.lights.set(light)
+    return time.monotonic()
+
+
+def _let_rise(station: Station, lit: float) -> None:
+    station.pause(station.document.robot.light_rise_s, since=lit)
+
+
+def _snap(station: Station, exposure: float) -> tuple[Image, float]:
+    """Expose once and return the picture and the time at which it was asked for."""
+    tries = TRIES
+    while True:
+        moment = time.time()
         try:
-            return station.camera.snap(exposure)
-        except CameraTimeoutError:
-            continue  # the camera has re-armed itself
-    return station.camera.snap(exposure)
+            return station.camera.snap(exposure), moment
+        except CameraTimeoutError:  # the camera has re-armed itself
+            tries -= 1
+            if not tries:
+                raise
 
 
 def _stood_still(station: Station, view: View) -> bool:
