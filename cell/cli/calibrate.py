@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import getpass
 import math
 from dataclasses import dataclass
 from enum import StrEnum
@@ -12,13 +13,13 @@ import typer
 from rich.table import Table
 
 from cell.cli.calibrate_cell import SPEED, YES, body, check
-from cell.cli.calibrate_operator import TerminalOperator
+from cell.cli.calibrate_operator import operator_of
 from cell.cli.calibrate_sets import CELL, FOLDER, JSON, activate, diff, history, rollback
 from cell.cli.words import answers, console, print_json
 
 if TYPE_CHECKING:
+    from cell.core.documents.calibration_session import What
     from cell.metrology.hand_eye_calibration import HandEyeAnswer
-    from cell.programs.calibration.wizard import What
 
 ACCEPTED, REFUSED = 0, 1
 STYLE = {"pass": "green", "solved": "green", "warn": "yellow", "refuse": "red"}
@@ -30,6 +31,8 @@ calibrate = typer.Typer(
 
 PLAN = typer.Option(None, "--plan", metavar="FILE", help="How to run the session: views, goal, "
                                                          "gates, reason; every key has a default.")
+LIVE = typer.Option(False, "--live", help="Show it in a viewer on this machine: "
+                                          "`cell view --live`.")
 RESUME = typer.Option(False, "--resume", help="Go on with the newest session of the cell.")
 
 
@@ -43,6 +46,7 @@ class Asked:
     resume: bool
     speed: float
     folder: Path
+    live: bool
     as_json: bool
 
 
@@ -70,27 +74,30 @@ calibrate.command()(rollback)
 
 @calibrate.command("camera")
 def camera(cell: str = CELL, plan: Path | None = PLAN, yes: bool = YES, resume: bool = RESUME,
-           speed: float = SPEED, folder: Path = FOLDER, as_json: bool = JSON) -> None:
+           speed: float = SPEED, folder: Path = FOLDER, live: bool = LIVE,
+           as_json: bool = JSON) -> None:
     """Calibrate the camera alone, for a look: a set needs light plane and hand-eye too (`all`).
 
     Exit code: 0 accepted, 1 refused, 2 bad input, 3 device fault.
     """
-    _run("camera", Asked(cell, plan, yes, resume, speed, folder, as_json))
+    _run("camera", Asked(cell, plan, yes, resume, speed, folder, live, as_json))
 
 
 @calibrate.command("light-plane")
 def light_plane(cell: str = CELL, plan: Path | None = PLAN, yes: bool = YES, resume: bool = RESUME,
-                speed: float = SPEED, folder: Path = FOLDER, as_json: bool = JSON) -> None:
+                speed: float = SPEED, folder: Path = FOLDER, live: bool = LIVE,
+                as_json: bool = JSON) -> None:
     """Calibrate the light plane with the active camera; makes a set.
 
     Exit code: 0 accepted, 1 refused, 2 bad input, 3 device fault.
     """
-    _run("light-plane", Asked(cell, plan, yes, resume, speed, folder, as_json))
+    _run("light-plane", Asked(cell, plan, yes, resume, speed, folder, live, as_json))
 
 
 @calibrate.command("all")
 def everything(cell: str = CELL, plan: Path | None = PLAN, yes: bool = YES, resume: bool = RESUME,
-               speed: float = SPEED, folder: Path = FOLDER, as_json: bool = JSON) -> None:
+               speed: float = SPEED, folder: Path = FOLDER, live: bool = LIVE,
+               as_json: bool = JSON) -> None:
     """Calibrate camera, light plane and hand-eye from one session; makes a set.
 
     You are asked to confirm robot, board and mounting, then to jog until the board fills the view.
@@ -99,7 +106,7 @@ def everything(cell: str = CELL, plan: Path | None = PLAN, yes: bool = YES, resu
 
     Exit code: 0 accepted, 1 refused (with reasons), 2 bad input, 3 device fault.
     """
-    _run("all", Asked(cell, plan, yes, resume, speed, folder, as_json))
+    _run("all", Asked(cell, plan, yes, resume, speed, folder, live, as_json))
 
 
 @calibrate.command("hand-eye")
@@ -111,7 +118,7 @@ def hand_eye(
     mount: Mount | None = typer.Option(None, help="Where the camera sits, if the folder does not "
                                                   "say: on the flange, or static."),
     cell: str = CELL, plan: Path | None = PLAN, yes: bool = YES, resume: bool = RESUME,
-    speed: float = SPEED, folder: Path = FOLDER, as_json: bool = JSON,
+    speed: float = SPEED, folder: Path = FOLDER, live: bool = LIVE, as_json: bool = JSON,
 ) -> None:
     """Find where the camera sits on the flange (or in the base, for a static camera).
 
@@ -124,7 +131,7 @@ def hand_eye(
     Exit code: 0 accepted, 1 refused (with reasons), 2 bad input.
     """
     if recorded is None:
-        _run("hand-eye", Asked(cell, plan, yes, resume, speed, folder, as_json))
+        _run("hand-eye", Asked(cell, plan, yes, resume, speed, folder, live, as_json))
     else:
         _solve_recorded(recorded, gates, mount, as_json)
 
@@ -147,14 +154,13 @@ def _run(what: What, asked: Asked) -> None:
     from cell.archive.files import read_text
     from cell.core.documents.calibration_session import CalibrationPlan
     from cell.core.documents.text import parse
-    from cell.programs.calibration.operators import Unattended
     from cell.programs.calibration.wizard import Request, run_wizard
 
     plan = (parse(CalibrationPlan, read_text(asked.plan), str(asked.plan)) if asked.plan
-            else CalibrationPlan())
-    terminal = TerminalOperator(console)
-    finished = run_wizard(Request(what, asked.cell, plan, asked.folder, asked.speed, asked.resume),
-                          Unattended(terminal.tell) if asked.yes else terminal)
+            else CalibrationPlan() if asked.yes else CalibrationPlan(operator=getpass.getuser()))
+    request = Request(what, asked.cell, plan, asked.folder, asked.speed, asked.resume, asked.live)
+    with operator_of(asked.yes) as operator:
+        finished = run_wizard(request, operator)
     solution = finished.solution
     if asked.as_json:
         print_json({"verdict": solution.verdict, "reasons": list(solution.reasons),

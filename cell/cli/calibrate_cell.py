@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import typer
 
-from cell.cli.calibrate_operator import TerminalOperator
+from cell.cli.calibrate_operator import operator_of
 from cell.cli.calibrate_sets import CELL, FOLDER, JSON, REASON
 from cell.cli.words import answers, console, print_json
 
 if TYPE_CHECKING:
-    from cell.core.ports import Operator
     from cell.programs.calibration.check import CheckedCell
 
 ACCEPTED, REFUSED = 0, 1
@@ -38,7 +37,8 @@ def body(job: Path = typer.Argument(..., help="The job whose master body is in t
     from cell.programs.calibration.body import BodyRequest, register_body
 
     request = BodyRequest(job, cell, "rps" if rps else "best", speed=speed, reason=reason)
-    done = register_body(request, _operator(yes))
+    with operator_of(yes) as operator:
+        done = register_body(request, operator)
     registration = done.registration
     if as_json:
         print_json({"verdict": done.verdict, "written": done.written and str(done.written),
@@ -63,8 +63,8 @@ def check(cell: str = CELL, calibration: Path = FOLDER, yes: bool = YES, speed: 
     """
     from cell.programs.calibration.check import CheckRequest, check_cell
 
-    done = check_cell(CheckRequest(cell, calibration, speed=speed, correct=correct),
-                      _operator(yes))
+    with operator_of(yes) as operator:
+        done = check_cell(CheckRequest(cell, calibration, speed=speed, correct=correct), operator)
     for gate in done.gates:
         console.print(f"{gate.verdict:6} {gate}", highlight=False)
     if as_json:
@@ -94,10 +94,3 @@ def _in_words(done: CheckedCell) -> str:
     taken = "; corrected, the registrations carry it from now on" if done.corrected else ""
     return (f"{done.alarm}: moving average {size:.3f} mm, left over after the rigid part "
             f"{done.drift.left_over:.3f} mm{taken}")
-
-
-def _operator(yes: bool) -> Operator:
-    from cell.programs.calibration.operators import Unattended
-
-    terminal = TerminalOperator(console)
-    return Unattended(terminal.tell) if yes else terminal

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+from cell.cli.keys import Keys
 from cell.cli.words import answers, console, print_json
 from cell.core.errors import INTERRUPTED
 
@@ -65,9 +67,8 @@ def _run(file: Path, logs: Path, **options: Any) -> tuple[dict[str, Any], int]: 
     from cell.programs.shift.run import ShiftRequest, run_shift
 
     signal.signal(signal.SIGTERM, _interrupt)
-    typed = sys.stdin if sys.stdin.isatty() else None
-    with _screen() as show:
-        done = run_shift(ShiftRequest(file, logs, typed=typed, **options), show, _tell)
+    with Keys() as keys, _screen(keys) as show:
+        done = run_shift(ShiftRequest(file, logs, typed=_typed(keys), **options), show, _tell)
     written = write_shift_report(logs, done.document, done.began, done.ended)
     answer = {"shift": done.document.name, "bodies": done.bodies, "booked": done.all_booked,
               "report": str(written.html), "csv": str(written.csv)}
@@ -82,16 +83,26 @@ def _report_only(file: Path, logs: Path) -> dict[str, Any]:
     return {"report": str(written.html), "csv": str(written.csv)}
 
 
+def _typed(keys: Keys) -> Iterable[str] | None:
+    """The lines typed at the terminal: under a screen, which is redrawn, the screen shows them."""
+    if not keys.here:
+        return None
+    return keys.lines() if console.is_terminal else sys.stdin
+
+
 @contextmanager
-def _screen() -> Iterator[Callable[[Board], None]]:
+def _screen(keys: Keys) -> Iterator[Callable[[Board], None]]:
     """Draw the board on a terminal; without one, say a line whenever it changes."""
     from rich.live import Live
 
     from cell.cli.shift_screen import draw, say
+    from cell.programs.shift.board import Board
 
     if console.is_terminal:
-        with Live(console=console, refresh_per_second=4) as live:
-            yield lambda board: live.update(draw(board))
+        shown = [Board("")]
+        with Live(get_renderable=lambda: draw(shown[0], keys.draft), console=console,
+                  refresh_per_second=8):
+            yield partial(shown.__setitem__, 0)
         return
     said = ""
 

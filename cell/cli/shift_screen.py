@@ -16,17 +16,19 @@ STATES = {"ready": "green", "measuring": "cyan", "result": "cyan", "master_due":
           "bypass": "yellow", "starting": "white", "stopped": "white"}
 
 
-def draw(board: Board) -> RenderableType:
-    """Draw one moment of a shift."""
+def draw(board: Board, draft: str = "") -> RenderableType:
+    """Draw one moment of a shift, and what is being typed."""
     colour = STATES.get(board.state, "red")
     title = Text(f" {board.state.replace('_', ' ').upper()} ", style=f"bold reverse {colour}")
     lines: list[RenderableType] = [title, Text(board.instruction, style="bold")]
     if board.detail:
         lines.append(Text(board.detail, style="red"))
-    if board.body_id:
+    if board.body_id and board.busy:
         lines.append(_body(board))
     lines.append(_strip(board.last))
     lines += [Text(warning, style="bold yellow") for warning in _warnings(board)]
+    if draft:
+        lines.append(Text(f"> {draft}_", style="bold"))
     return Panel(Group(*lines), title=f"shift {board.shift}", border_style=colour)
 
 

@@ -136,6 +136,12 @@ class Operator(Protocol):
     def ask(self, question: str, default: str | None = None) -> str:
         """Ask for a line of text."""
 
+    def glance(self, line: str) -> None:
+        """Show a line that takes the place of the glance before it."""
+
+    def pressed(self) -> str | None:
+        """Say which key was pressed since the last call, one a call, None for none. Never waits."""
+
 
 LineVerdict: TypeAlias = Literal["ok", "nok", "uncertain", "incomplete"]
 Command: TypeAlias = Literal["start", "abort", "reset", "bypass", "end_bypass", "stop"]

@@ -18,12 +18,15 @@ from types import TracebackType
 from typing import TypeAlias
 
 from cell.core.documents.record import HoleRecord, Start, Stop
+from cell.recording.calibration_moment import CalibrationMoment
 from cell.recording.viewer import LIVE_PORT, dying_with_parent
 
 log = logging.getLogger(__name__)
 
-Message: TypeAlias = tuple[int, Start | HoleRecord | Stop]
-"""A paper, and its place on the time line."""
+Paper: TypeAlias = Start | HoleRecord | Stop | CalibrationMoment
+
+Message: TypeAlias = tuple[int, Paper]
+"""A paper, and its place on the time line of holes."""
 
 WAITING = 3
 """Papers that may wait for the viewer before the oldest is dropped."""
@@ -32,7 +35,9 @@ FAREWELL_S = 3.0
 
 
 class LiveView:
-    """Shows runs, one after the other, in a viewer on this machine: `cell view --live`."""
+    """Shows runs and calibrations, one after the other, in a viewer on this machine: `cell view
+    --live`.
+    """
 
     def __init__(self, port: int = LIVE_PORT) -> None:
         """Aim at a viewer on a port of the loopback interface; it need not be there."""
@@ -45,8 +50,8 @@ class LiveView:
         self._carrier = Thread(target=self._carry, name="live view", daemon=True)
         self._carrier.start()
 
-    def show(self, paper: Start | HoleRecord | Stop) -> None:
-        """Show one more paper of the run. Never raises, never waits."""
+    def show(self, paper: Paper) -> None:
+        """Show a paper of the run, or a moment of the calibration. Never raises, never waits."""
         self._holes = 0 if isinstance(paper, Start) else self._holes
         self._waiting.append((self._holes, paper))
         self._holes += isinstance(paper, HoleRecord)

@@ -60,7 +60,7 @@ def check_resumed(plant, what, plan, lines):
     kept = (sessions[0] / "views.jsonl").read_text().splitlines()
     assert kept[:len(before)] == before
     session = Session.read(sessions[0])
-    planned = len(session.header.targets) - 1
+    planned = len(session.header.targets)
     assert [view.number for view in session.views] == list(range(1, planned + 1))
     assert len(kept) == planned  # none was taken twice
     check_set(home / "sets" / answer["set"])

@@ -19,6 +19,7 @@ from cell.core.errors import DocumentError
 from cell.core.geometry import Transform
 from cell.programs.calibration.belief import read_belief
 from cell.programs.calibration.session import Session
+from cell.programs.calibration.shown import Shown
 from cell.programs.calibration.solve import solve_session
 from cell.programs.calibration.wizard import Request, conclude, run_wizard
 
@@ -161,6 +162,7 @@ def test_warnings_need_a_reason(plant, finished, tmp_path):
     (folder / "views.jsonl").write_text("\n".join(keep[:13]))
     (folder / "session.json").write_text(json.dumps(header))
     operator = Scripted()
-    result = conclude(Session.read(folder), read_belief(plant, "demo"), operator)
+    belief = read_belief(plant, "demo")
+    result = conclude(Session.read(folder), belief, operator, Shown(belief, "all", "", None))
     assert result.set_id is None
     assert operator.heard("Why is this set acceptable") or operator.heard("Refused")

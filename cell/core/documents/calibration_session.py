@@ -13,7 +13,10 @@ from cell.core.documents.station import NotNegative, Positive
 from cell.core.documents.targets import BoardDocument, SphereDocument
 from cell.core.geometry import Transform
 
-Purpose = Literal["start", "fit", "hold_out", "sphere"]
+Purpose = Literal["fit", "hold_out", "sphere"]
+What = Literal["camera", "light-plane", "hand-eye", "all"]
+NotNegativeInt = Annotated[int, Field(ge=0)]
+SCHEMA: Literal[2] = 2
 
 
 class CalibrationPlan(Document):
@@ -21,7 +24,8 @@ class CalibrationPlan(Document):
 
     `goal_mm` is the predicted uncertainty of a point at which capturing may stop early. `reason`
     is recorded where a warning is accepted; without one, warnings are not accepted unattended.
-    `kinematics` has the arm's own rows estimated too, where views kept apart gain by it.
+    `kinematics` has the arm's own rows estimated too and kept where views kept apart gain by it;
+    that takes boards in two places or more, and `views_elsewhere` of each further one.
     `sphere_views` look at the cell's sphere in the end, a check that nothing is fitted to; 0 leaves
     it out.
     """
@@ -39,35 +43,93 @@ class CalibrationPlan(Document):
     aside_mm: NotNegative = 6.0
     gates: Literal["fine", "coarse"] = "fine"
     kinematics: bool = False
+    views_elsewhere: Annotated[int, Field(ge=6, le=40)] = 10
     activate: bool = True
     reason: str = ""
 
 
-class SessionHeader(Document):
-    """`session.json`: what must not change during a session, and what was planned."""
+class Precondition(Document):
+    """One line of the first screen: what was found, what was wanted, and what to make of it.
 
-    version: Literal[1] = 1
+    `asked` is for what no device can tell: the operator confirmed it.
+    """
+
+    item: str
+    found: str
+    wanted: str
+    verdict: Literal["pass", "asked", "warn", "refuse"] = "pass"
+    advice: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.item}: {self.found}, wanted {self.wanted}. {self.advice}".strip()
+
+
+class PlacedBoard(Document):
+    """A board of the session: where it was found to stand, and the joints (rad) of its start view,
+    from which all of its views can be reached.
+    """
+
+    board: BoardDocument
+    base_from_board: Matrix4
+    start: Vector6
+
+
+class Target(Document):
+    """One planned stop: joints (rad), and the place of its board among those of the session."""
+
+    purpose: Purpose
+    joints: Vector6
+    place: NotNegativeInt = 0
+
+
+class SessionHeader(Document):
+    """`session.json`: what must not change during a session, and what was planned.
+
+    The first board is the one that camera, light plane and hand-eye are found with; views of
+    others tell of the arm's own kinematics. Targets are counted from 1, in the order of capture.
+    `accepted` is why preconditions that only warned were accepted.
+    """
+
+    version: Literal[2] = SCHEMA
     cell: str
-    what: Literal["camera", "light-plane", "hand-eye", "all"]
+    what: What
     begun: str
     base_set: str
     robot: RobotRecord
     sensor_serial: str | None
-    board: BoardDocument
+    boards: Annotated[tuple[PlacedBoard, ...], Field(min_length=1)]
     sphere: SphereDocument | None = None
     plan: CalibrationPlan
-    base_from_board: Matrix4
-    targets: tuple[tuple[Purpose, Vector6], ...]  # joints in rad, in the order of capture
+    preconditions: tuple[Precondition, ...] = ()
+    accepted: str = ""
+    targets: tuple[Target, ...]
+
+    @property
+    def board(self) -> BoardDocument:
+        """The first board."""
+        return self.boards[0].board
+
+    @property
+    def warnings(self) -> tuple[Precondition, ...]:
+        """The preconditions that were accepted though they are not met."""
+        return tuple(one for one in self.preconditions if one.verdict == "warn")
+
+    @property
+    def numbered(self) -> dict[int, Target]:
+        """The targets by their numbers."""
+        return dict(enumerate(self.targets, 1))
 
 
 class ViewRecord(Document):
     """One line of `views.jsonl`: one stop, two pictures, where the flange stood before and after.
 
-    `ring` and `stripe` name the pictures; `status` other than `ok` is why the view is not used.
+    `ring` and `stripe` name the pictures; `status` other than `ok` is why the view is not used. A
+    later line of the same number is the view taken again. `temperatures` are the joints' (C).
     """
 
     number: int
     purpose: Purpose
+    place: NotNegativeInt = 0
     joints: Vector6
     base_from_flange: Matrix4
     base_from_flange_after: Matrix4

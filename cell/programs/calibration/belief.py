@@ -9,7 +9,11 @@ import numpy as np
 
 from cell.archive.files import read_text
 from cell.archive.sets import active_set, cell_folder, read_set
-from cell.core.documents.calibration import HandEyeDocument, SensorDocument
+from cell.core.documents.calibration import (
+    HandEyeDocument,
+    KinematicsDocument,
+    SensorDocument,
+)
 from cell.core.documents.station import StationDocument
 from cell.core.documents.targets import BoardDocument, TargetsDocument
 from cell.core.documents.text import parse
@@ -17,8 +21,10 @@ from cell.core.errors import DocumentError
 from cell.core.geometry import Transform
 from cell.core.kinematics import Arm, arm_for
 from cell.core.optics import SensorModel
+from cell.core.ports import Joints
 from cell.metrology.detect_board import BoardDesign
 from cell.metrology.ridge import runs_upright
+from cell.programs.calibration.chain import Chain
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +37,17 @@ class Belief:
     set_id: str
     sensor_document: SensorDocument
     hand_eye: HandEyeDocument
+    kinematics: KinematicsDocument | None = None
+
+    @property
+    def home(self) -> Joints:
+        """Where the arm begins and ends (rad)."""
+        return tuple(float(angle) for angle in np.radians(self.station.home_deg))
+
+    @property
+    def chain(self) -> Chain:
+        """The way from the camera to the base as believed."""
+        return Chain(self.flange_from_camera, self.kinematics)
 
     @property
     def sensor(self) -> SensorModel:
@@ -75,11 +92,14 @@ def read_belief(calibration: Path, cell: str) -> Belief:
     folder = cell_folder(calibration, cell)
     set_id = active_set(folder)
     found = read_set(folder, set_id)
+    kinematics = (parse(KinematicsDocument, found.texts["kinematics"], found.sources["kinematics"])
+                  if "kinematics" in found.texts else None)
     station, targets = (folder / name for name in ("cell.yaml", "targets.yaml"))
     return Belief(folder, parse(StationDocument, read_text(station), str(station)),
                   parse(TargetsDocument, read_text(targets), str(targets)), set_id,
                   parse(SensorDocument, found.texts["sensor"], found.sources["sensor"]),
-                  parse(HandEyeDocument, found.texts["hand_eye"], found.sources["hand_eye"]))
+                  parse(HandEyeDocument, found.texts["hand_eye"], found.sources["hand_eye"]),
+                  kinematics)
 
 
 def design_of(board: BoardDocument) -> BoardDesign:

@@ -113,7 +113,7 @@ def _place(board: BoardDocument, belief: Belief, station: Station,
             operator.tell(f"{board.id}: {error.detail}")
             continue
         pose = locate_boards([view], belief.sensor.camera)[0].camera_from_board
-        seen.append(ring.base_from_flange_before @ belief.flange_from_camera @ pose
+        seen.append(belief.chain.base_from_camera(ring.base_from_flange_before, ring.joints) @ pose
                     @ design.outline)
     if not seen:
         raise DocumentError(f"the board {board.id} was not seen", source=belief.station.name)
@@ -130,7 +130,7 @@ def _check_sphere(sphere: SphereDocument, belief: Belief, station: Station, oper
         drive(station, free_path(belief, station.robot.state().joints, joints, start))
         if joints is not start:
             looks += _look(sphere, belief, station, operator)
-    return check_sphere(looks, sphere, belief.sensor, belief.flange_from_camera,
+    return check_sphere(looks, sphere, belief.sensor, belief.chain,
                         read_gates().level(gates).sphere)
 
 
@@ -138,7 +138,7 @@ def _look(sphere: SphereDocument, belief: Belief, station: Station,
           operator: Operator) -> list[SphereLook]:
     view = shoot(station).stripe
     try:
-        return [see_sphere(view.image, view.base_from_flange_before, sphere, belief)]
+        return [see_sphere(view.image, view.base_from_flange_before, view.joints, sphere, belief)]
     except UnmeasurableError as error:
         operator.tell(f"{sphere.id}: {error.detail}")
         return []

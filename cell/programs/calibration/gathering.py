@@ -1,29 +1,29 @@
-"""The capture loop: one line a view, retake, skip, pause or quit, and an early stop at the goal."""
+"""The capture loop: one line a view; retake, skip, pause, quit at any; early stop at the goal."""
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from cell.core.documents.calibration_session import Purpose, ViewRecord
+from cell.core.documents.calibration_session import Target
 from cell.core.errors import DocumentError, UnmeasurableError
-from cell.core.geometry import Transform
 from cell.core.ports import Operator
-from cell.metrology.board_pose import locate_boards
-from cell.metrology.hand_eye import HandEyeProblem, HandEyeView
-from cell.metrology.pose_planning import predict_point_sigma
-from cell.programs.calibration.belief import Belief, design_of
-from cell.programs.calibration.capture import Shots, as_rows, as_six, drive, record, shoot
+from cell.programs.calibration.belief import Belief
+from cell.programs.calibration.capture import Shots, describe, drive, record, record_skipped, shoot
 from cell.programs.calibration.poses import free_path
-from cell.programs.calibration.seen import SeenView, see_view
+from cell.programs.calibration.progress import Progress
+from cell.programs.calibration.seen import see_again, see_view
 from cell.programs.calibration.session import Session
+from cell.programs.calibration.shown import Shown
 from cell.programs.calibration.sphere import see_sphere
 from cell.programs.station import Station
 
 TRIES = 3
-ENOUGH = 12  # views before an early stop
-FEWEST_TO_PREDICT = 3
+KEYS = {"p": "pause", "r": "retake", "s": "skip", "q": "quit"}
+SAY_KEYS = "p pause, r retake the last view, s skip the next, q quit"
+PAUSED = "Paused: the arm stands, the lights are off."
 
 
 @dataclass(eq=False)
@@ -33,8 +33,14 @@ class Gathering:
     session: Session
     belief: Belief
     station: Station
-    operator: Operator | None = None
-    known: list[HandEyeView] = field(default_factory=list)
+    operator: Operator
+    shown: Shown
+    progress: Progress = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.progress = Progress(self.session.header, self.belief)
+        self._targets = self.session.header.numbered
+        self._place, self._done = 0, False
 
     def gather(self) -> None:
         """Capture all planned views that are not on the disk yet.
@@ -43,33 +49,87 @@ class Gathering:
             DeviceError: a device failed; the views until then are on the disk.
             DocumentError: the operator quit, or the disk refuses.
         """
-        done = {view.number: view for view in self.session.views}
-        for view in done.values():
-            if view.status == "ok" and view.purpose == "fit":
-                self._know(self.see_again(view))
-        for number, (purpose, joints) in enumerate(self.session.header.targets):
-            if purpose == "start" or number in done or self._skips(purpose):
+        self._take_up()
+        known = {view.number for view in self.session.views}
+        waiting, last = deque(sorted(set(self._targets) - known)), 0
+        while waiting:
+            number = waiting.popleft()
+            if self._is_spared(number):
                 continue
-            self._go(joints)
-            self._capture(number, purpose)
+            wish = self._arrive(number)
+            if wish == "retake" and last:
+                waiting.extendleft([number] if last == number else [number, last])
+                continue
+            self._skip(number) if wish == "skip" else self._capture(number)
+            last = number
+        self._say_how_far()
 
-    def look(self, number: int, purpose: Purpose) -> SeenView:
-        """Take one view from where the arm stands, without keeping it.
+    def _take_up(self) -> None:
+        """See again what is on the disk."""
+        for view in self.session.views:
+            if view.status == "ok" and view.purpose != "sphere":
+                self.progress.know(see_again(view, self.session, self.belief))
+        self.shown.plan(self.session, self.progress)
+
+    def _is_spared(self, number: int) -> bool:
+        """Tell whether a view to be fitted to is not needed any more: the goal is reached."""
+        target, plan = self._targets[number], self.session.header.plan
+        if (target.purpose, target.place) != ("fit", 0) or number in self.progress:
+            return False
+        if not (plan.early_stop and self.progress.at_goal):
+            return False
+        if not self._done:
+            self._done = True
+            self.operator.tell(
+                f"The goal is reached with {len(self.progress.gathered)} views: predicted "
+                f"uncertainty {self.progress.predicted:.3f} mm (goal {plan.goal_mm:.3f}), and "
+                "every gate that the views decide is passed. The other views to be fitted to are "
+                "left out; those kept apart follow.")
+        self.shown.spare(number)
+        return True
+
+    def _arrive(self, number: int) -> str:
+        """Drive to a view; say what the operator wants, before the drive and on arrival."""
+        self.shown.approach(number)
+        wish = self._wish()
+        if not wish:
+            self._go(self._targets[number])
+            wish = self._wish()
+        return wish
+
+    def _wish(self) -> str:
+        """Follow the keys that were pressed: `retake`, `skip`, or nothing; pauses are spent here.
 
         Raises:
-            UnmeasurableError: no board in it.
+            DocumentError: the operator quit.
         """
-        shots = shoot(self.station)
-        return self._see(shots, number, purpose)
+        wish = KEYS.get(self.operator.pressed() or "", "")
+        if wish == "pause":
+            self.station.lights.off()
+            self.shown.step("paused", PAUSED)
+            wish = self.operator.choose(f"{PAUSED} How to go on?",
+                                        ("continue", "retake", "skip", "quit"))
+        return self._unless_quit(wish)
 
-    def see_again(self, view: ViewRecord) -> SeenView:
-        """Detect again in the pictures of a view that is on the disk."""
-        size = self.belief.sensor.camera.image_size
-        return see_view(view, self.session.read_image(view.ring, size),
-                        self.session.read_image(view.stripe, size), self.belief,
-                        design_of(self.session.header.board))
+    def _unless_quit(self, wish: str) -> str:
+        if wish == "quit":
+            raise DocumentError("stopped by the operator; --resume goes on",
+                                source=str(self.session.folder))
+        return "" if wish == "continue" else wish
 
-    def _capture(self, number: int, purpose: Purpose) -> None:
+    def _go(self, target: Target) -> None:
+        boards = self.session.header.boards
+        here = self.station.robot.state().joints
+        drive(self.station, free_path(self.belief, here, target.joints, boards[self._place].start,
+                                      self.belief.home, boards[target.place].start))
+        self._place = target.place
+
+    def _skip(self, number: int) -> None:
+        record_skipped(self.session, number, self.station, "skipped by the operator")
+        self._leave_out(number, "by the operator")
+
+    def _capture(self, number: int) -> None:
+        """Take a view, again where the arm moved or the operator wants; leave it out at last."""
         shots, status = shoot(self.station), ""
         for attempt in range(TRIES):
             shots = shoot(self.station) if attempt else shots
@@ -77,89 +137,74 @@ class Gathering:
                 status = "the robot moved"
                 continue
             try:
-                self._keep(shots, number, purpose)
+                self._keep(shots, number)
             except UnmeasurableError as error:
                 status = error.detail
-                if not self._again(number, status):
+                self.shown.nothing(shots, status)
+                if self._ask_after(number, status) != "retake":
                     break
             else:
                 return
-        record(self.session, number, purpose, shots, 0, status)
-        self._tell(f"{number:02}/{self._last} skipped: {status}")
+        record(self.session, number, shots, 0, status)
+        self._leave_out(number, status)
 
-    def _keep(self, shots: Shots, number: int, purpose: Purpose) -> None:
-        if purpose == "sphere":
+    def _ask_after(self, number: int, status: str) -> str:
+        return self._unless_quit(self.operator.choose(
+            f"view {number}: {status}", ("retake", "skip", "quit")))
+
+    def _leave_out(self, number: int, why: str) -> None:
+        self.progress.forget(number)
+        self.shown.spare(number)
+        self.operator.tell(f"{self._counted(number)} skipped: {why}")
+
+    def _keep(self, shots: Shots, number: int) -> None:
+        if self._targets[number].purpose == "sphere":
             self._keep_sphere(shots, number)
         else:
-            self._keep_board(shots, number, purpose)
+            self._keep_board(shots, number)
 
     def _keep_sphere(self, shots: Shots, number: int) -> None:
         assert self.session.header.sphere is not None
-        look = see_sphere(shots.stripe.image, shots.ring.base_from_flange_before,
-                          self.session.header.sphere, self.belief)
-        record(self.session, number, "sphere", shots, 0, "ok")
-        self._tell(f"{number:02}/{self._last} ok sphere   {len(look.pixels)} points of the stripe")
+        look = see_sphere(shots.stripe.image, shots.stripe.base_from_flange_before,
+                          shots.stripe.joints, self.session.header.sphere, self.belief)
+        record(self.session, number, shots, 0, "ok")
+        self.shown.sphere(number, shots, look.pixels)
+        self.operator.tell(f"{self._counted(number)} ok sphere   {len(look.pixels)} points of the "
+                           "stripe")
 
-    def _keep_board(self, shots: Shots, number: int, purpose: Purpose) -> None:
-        view = self._see(shots, number, purpose)
-        record(self.session, number, purpose, shots, len(view.board.pixels), "ok")
-        before = after = self.predicted()
-        if purpose == "fit":
-            self._know(view)
-            after = self.predicted()
-        stripe = "" if view.stripe is not None else "   no stripe"
-        self._tell(f"{number:02}/{self._last} ok {purpose:8} {len(view.board.pixels)} corners"
-                   f"{stripe} | predicted uncertainty {_figure(before)} -> "
-                   f"{_figure(after)} mm (goal {self.session.header.plan.goal_mm:.3f})")
+    def _keep_board(self, shots: Shots, number: int) -> None:
+        target = self._targets[number]
+        board = self.session.header.boards[target.place].board
+        view = see_view(describe(self.session, number, shots), shots.ring.image,
+                        shots.stripe.image, self.belief, board)
+        record(self.session, number, shots, len(view.board.pixels), "ok")
+        before = self.progress.predicted
+        self.progress.know(view)
+        self.shown.board(view, shots, self.progress)
+        where = f" at {board.id}" if target.place else ""
+        stripe = "" if view.stripe is not None else ", no stripe"
+        self.operator.tell(f"{self._counted(number)} ok {target.purpose:8} "
+                           f"{len(view.board.pixels)} corners{stripe}{where}{self._fallen(before)}")
 
-    def _see(self, shots: Shots, number: int, purpose: Purpose) -> SeenView:
-        view = ViewRecord(number=number, purpose=purpose, joints=as_six(shots.ring.joints),
-                          base_from_flange=as_rows(shots.ring.base_from_flange_before),
-                          base_from_flange_after=as_rows(shots.stripe.base_from_flange_after),
-                          time=shots.ring.time, ring="", stripe="")
-        return see_view(view, shots.ring.image, shots.stripe.image, self.belief,
-                        design_of(self.session.header.board))
+    def _fallen(self, before: float) -> str:
+        """Say how far the predicted uncertainty has come down, and what is missing yet."""
+        missing = next((check for check in self.progress.checks if check.verdict != "pass"), None)
+        lacks = "" if missing is None else f" | {missing.meaning} {missing.value:.3g}, wanted " \
+                                           f"{missing.limit.partition(' (')[0]}"
+        if not self.progress.has_goal:
+            return lacks
+        return (f" | predicted uncertainty {_figure(before)} -> {_figure(self.progress.predicted)} "
+                f"mm (goal {self.session.header.plan.goal_mm:.3f}){lacks}")
 
-    def predicted(self) -> float:
-        """Predict the uncertainty (mm) of a point after the views so far; NaN before three."""
-        if len(self.known) < FEWEST_TO_PREDICT:
-            return float("nan")
-        place = Transform(np.array(self.session.header.base_from_board))
-        return predict_point_sigma(HandEyeProblem(tuple(self.known)),
-                                   self.belief.flange_from_camera, place,
-                                   self.belief.sensor.working_distance)
+    def _say_how_far(self) -> None:
+        goal = self.session.header.plan.goal_mm
+        if self.progress.has_goal and not self.progress.predicted <= goal:
+            self.operator.tell(f"The goal of {goal:.3f} mm is not reached: the views predict "
+                               f"{_figure(self.progress.predicted)} mm. Plan more views, or views "
+                               "that lean and roll more.")
 
-    def _know(self, view: SeenView) -> None:
-        board = locate_boards([view.board], self.belief.sensor.camera)[0]
-        self.known.append(HandEyeView(view.record.pose, board))
-
-    def _skips(self, purpose: Purpose) -> bool:
-        plan = self.session.header.plan
-        return (purpose == "fit" and plan.early_stop and len(self.known) >= ENOUGH
-                and self.session.header.what == "hand-eye" and self.predicted() <= plan.goal_mm)
-
-    def _go(self, joints: tuple[float, ...]) -> None:
-        start = self.session.header.targets[0][1]
-        here = self.station.robot.state().joints
-        drive(self.station, free_path(self.belief, here, joints, start))
-
-    def _again(self, number: int, status: str) -> bool:
-        """Ask what to do with a view that carries no board."""
-        if self.operator is None:
-            return False
-        answer = self.operator.choose(f"view {number}: {status}", ("retake", "skip", "quit"))
-        if answer == "quit":
-            raise DocumentError("stopped by the operator; --resume goes on",
-                                source=str(self.session.folder))
-        return answer == "retake"
-
-    @property
-    def _last(self) -> int:
-        return len(self.session.header.targets) - 1
-
-    def _tell(self, line: str) -> None:
-        if self.operator is not None:
-            self.operator.tell(line)
+    def _counted(self, number: int) -> str:
+        return f"{number:02}/{len(self._targets)}"
 
 
 def _figure(value: float) -> str:

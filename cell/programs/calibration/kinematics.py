@@ -8,23 +8,26 @@ from dataclasses import dataclass
 import numpy as np
 
 from cell.core.documents.calibration import KinematicsDocument
-from cell.core.geometry import Array, Transform
+from cell.core.geometry import Array
 from cell.core.optics import CameraModel
-from cell.metrology.arm_correction import correct_flange
 from cell.metrology.board_pose import locate_boards
 from cell.metrology.hand_eye_calibration import HandEyeAnswer
 from cell.metrology.kinematic_calibration import JointView, KinematicResult, solve_kinematics
 from cell.programs.calibration.belief import Belief
 from cell.programs.calibration.capture import as_six
+from cell.programs.calibration.chain import Chain
 from cell.programs.calibration.seen import SeenView
 
 
 @dataclass(frozen=True, eq=False)
 class KinematicsFound:
-    """The estimate, and how still (mm, rms) the board stood without and with it in views apart."""
+    """The estimate from boards in so many `places`, and how still (mm, rms) they stood without and
+    with it in views apart.
+    """
 
     result: KinematicResult
     document: KinematicsDocument
+    places: int
     apart_without: float
     apart_with: float
 
@@ -33,22 +36,33 @@ class KinematicsFound:
         """Whether the views kept apart gain."""
         return self.apart_with < self.apart_without
 
+    def __str__(self) -> str:
+        return (f"kinematics, boards in {self.places} place{'s' * (self.places > 1)}: views kept "
+                f"apart {self.apart_without:.3f} mm without, {self.apart_with:.3f} mm with the "
+                f"arm's own rows: {'kept' if self.useful else 'not kept'}")
+
 
 def find_kinematics(views: Sequence[SeenView], camera: CameraModel, answer: HandEyeAnswer,
                     belief: Belief) -> KinematicsFound | None:
-    """Estimate the arm's rows from the views that the hand-eye was fitted to."""
-    fitted = [view for view in views if view.record.number in answer.used]
-    apart = [view for view in views if view.record.number in answer.apart]
+    """Estimate the arm's rows from views of all places of the board; None where there are too few.
+
+    At the first place they are those that the hand-eye was fitted to.
+    """
+    fitted = [view for view in views if view.record.number in answer.used
+              or (view.record.place and view.record.purpose == "fit")]
+    apart = [view for view in views if view.record.number in answer.apart
+             or (view.record.place and view.record.purpose == "hold_out")]
     if answer.held_out is None or len(apart) < 2:
         return None
     mount = answer.held_out.result.carrier_from_camera
     boards = locate_boards([view.board for view in fitted], camera)
     result = solve_kinematics(
-        [JointView(view.record.joints, board, base_from_reported=view.record.pose)
+        [JointView(view.record.joints, board, str(view.record.place), view.record.pose)
          for view, board in zip(fitted, boards, strict=True)], belief.arm, mount)
     document = _document(result, belief.station.robot.model)
-    return KinematicsFound(result, document, _restless(apart, camera, mount, None),
-                           _restless(apart, camera, result.flange_from_camera, document))
+    return KinematicsFound(result, document, len({view.record.place for view in fitted}),
+                           _restless(apart, camera, Chain(mount)),
+                           _restless(apart, camera, Chain(result.flange_from_camera, document)))
 
 
 def _document(result: KinematicResult, model: str) -> KinematicsDocument:
@@ -57,14 +71,15 @@ def _document(result: KinematicResult, model: str) -> KinematicsDocument:
     return KinematicsDocument(model=model, a=a, d=d, alpha=alpha, theta=theta)
 
 
-def _restless(views: Sequence[SeenView], camera: CameraModel, mount: Transform,
-              document: KinematicsDocument | None) -> float:
-    """How far the middle of the board moves between views (mm, rms about its mean)."""
+def _restless(views: Sequence[SeenView], camera: CameraModel, chain: Chain) -> float:
+    """How far the middle of a board moves between the views of its place: mm, rms."""
     middle = np.concatenate([view.board.points_in_board for view in views]).mean(axis=0)
-    places: list[Array] = [
-        correct_flange(view.record.pose, view.record.joints, document) @ mount
-        @ board.camera_from_board @ middle
-        for view, board in zip(views, locate_boards([view.board for view in views], camera),
-                               strict=True)]
-    spread = np.array(places) - np.mean(places, axis=0)
-    return float(np.sqrt(np.mean(np.sum(spread ** 2, axis=1))))
+    places: dict[int, list[Array]] = {}
+    for view, board in zip(views, locate_boards([view.board for view in views], camera),
+                           strict=True):
+        point = (chain.base_from_camera(view.record.pose, view.record.joints)
+                 @ board.camera_from_board @ middle)
+        places.setdefault(view.record.place, []).append(point)
+    off = np.concatenate([np.array(points) - np.mean(points, axis=0)
+                          for points in places.values()])
+    return float(np.sqrt(np.mean(np.sum(off ** 2, axis=1))))

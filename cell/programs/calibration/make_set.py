@@ -16,7 +16,7 @@ from cell.core.geometry import Array
 from cell.programs.calibration.belief import Belief
 from cell.programs.calibration.capture import as_rows
 from cell.programs.calibration.session import Session
-from cell.programs.calibration.solve import Solution
+from cell.programs.calibration.solve import Solution, chain_of
 from cell.report.calibration import CalibrationPage, calibration_report
 
 
@@ -40,8 +40,8 @@ def make_set(session: Session, solution: Solution, belief: Belief, signature: Si
     shutil.copytree(session.folder, made)
     replace_text(made / "sensor.yaml", dump(sensor_document(solution, belief)))
     replace_text(made / "hand_eye.yaml", dump(hand_eye_document(session, solution, belief)))
-    if solution.kinematics is not None and solution.kinematics.useful:
-        replace_text(made / "kinematics.yaml", dump(solution.kinematics.document))
+    if (kinematics := chain_of(solution, belief).kinematics) is not None:
+        replace_text(made / "kinematics.yaml", dump(kinematics))
     replace_text(made / "report.html", calibration_report(page_of(solution, session.header,
                                                                   signature)))
     return write_set(belief.folder, made, signature.at)
@@ -55,6 +55,7 @@ def page_of(solution: Solution, header: SessionHeader, signature: Signature) -> 
              "kinematics": header.robot.kinematics_checksum or "-",
              "sensor": header.sensor_serial or "-",
              "board": f"{header.board.id}, {header.board.certificate or 'no certificate'}",
+             "preconditions": "; ".join(map(str, header.warnings)) or "all met",
              "made upon the set": header.base_set}
     return CalibrationPage(facts, solution.verdict, solution.reasons, solution.gates,
                            solution.camera_result, solution.light_plane, solution.hand_eye,
@@ -82,16 +83,15 @@ def hand_eye_document(session: Session, solution: Solution, belief: Belief) -> H
     answer = solution.hand_eye
     if answer is None or answer.held_out is None:
         return belief.hand_eye
-    result, mount = answer.held_out.result, answer.held_out.result.carrier_from_camera
+    result, still = answer.held_out.result, answer.figures["object_rms_mm"]
     if solution.kinematics is not None and solution.kinematics.useful:
-        mount = solution.kinematics.result.flange_from_camera
-    still = answer.figures["object_rms_mm"] / np.sqrt(3.0)
+        still = solution.kinematics.apart_with
     return belief.hand_eye.model_copy(update={
-        "flange_from_camera": as_rows(mount),
+        "flange_from_camera": as_rows(chain_of(solution, belief).flange_from_camera),
         "robot": session.header.robot,
         "sensor_serial": session.header.sensor_serial,
         "covariance": _rows(result.covariance[:6, :6]),
-        "robot_repeatability_mm": max(float(still), 0.01)})
+        "robot_repeatability_mm": max(float(still / np.sqrt(3.0)), 0.01)})
 
 
 def _rows(matrix: Array) -> tuple[tuple[float, ...], ...]:

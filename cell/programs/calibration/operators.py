@@ -31,3 +31,10 @@ class Unattended:
         """Give the default."""
         self.say(f"{question} {default or ''}")
         return default or ""
+
+    def glance(self, line: str) -> None:
+        """Pass it on."""
+        self.say(line)
+
+    def pressed(self) -> None:
+        """Press no key."""

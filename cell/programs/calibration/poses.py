@@ -42,7 +42,7 @@ def plan_start(belief: Belief, design: BoardDesign, base_from_board: Transform) 
     camera = belief.sensor.camera
     straight = draw_candidates(1, design, camera, belief.sensor.working_distance,
                                Spread(0.1, 0.1, 0.1, 0.0))
-    home = tuple(float(angle) for angle in np.radians(belief.station.home_deg))
+    home = belief.home
     joints = _joints(belief, base_from_board, straight[0], home) if straight else None
     problems = _problems(belief, home, joints) if joints else ("out of reach",)
     if joints is None or problems:
@@ -99,13 +99,14 @@ def plan_sphere(belief: Belief, sphere: SphereDocument, start: Joints,
     return tuple(free[:count])
 
 
-def free_path(belief: Belief, here: Joints, there: Joints, safe: Joints) -> list[Joints]:
-    """Choose the moves to a view: straight, or by the start view where straight is not free.
+def free_path(belief: Belief, here: Joints, there: Joints, *safe: Joints) -> list[Joints]:
+    """Choose the moves to a view: straight, or by the last of the safe places, or the last two ...
 
     Raises:
-        DocumentError: neither is free.
+        DocumentError: none of these ways is free.
     """
-    for path in ([there], [safe, there]):
+    for count in range(len(safe) + 1):
+        path = [*safe[len(safe) - count:], there]
         legs = zip([here, *path[:-1]], path, strict=True)
         if not any(_problems(belief, *leg) for leg in legs):
             return path

@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from cell.core.documents.calibration_session import ViewRecord
+from cell.core.documents.targets import BoardDocument
 from cell.core.errors import UnmeasurableError
 from cell.core.geometry import Array
 from cell.core.observation import Image
 from cell.metrology.board_pose import BoardView
-from cell.metrology.detect_board import BoardDesign, detect_board
+from cell.metrology.detect_board import detect_board
 from cell.metrology.detect_board_stripe import detect_board_stripe
-from cell.programs.calibration.belief import Belief
+from cell.programs.calibration.belief import Belief, design_of
+from cell.programs.calibration.session import Session
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,15 +26,28 @@ class SeenView:
 
 
 def see_view(record: ViewRecord, ring: Image, stripe: Image, belief: Belief,
-             design: BoardDesign) -> SeenView:
+             document: BoardDocument) -> SeenView:
     """Detect board and stripe in the two pictures of a view.
 
     Raises:
         UnmeasurableError: no board.
     """
-    board = detect_board(ring, design).view
+    board = detect_board(ring, design_of(document)).view
     try:
         points = detect_board_stripe(stripe, ring, belief.sensor.camera, upright=belief.upright)
     except UnmeasurableError:
         return SeenView(record, board, None)
     return SeenView(record, board, points)
+
+
+def see_again(record: ViewRecord, session: Session, belief: Belief) -> SeenView:
+    """Detect in the pictures of a view that is on the disk.
+
+    Raises:
+        UnmeasurableError: no board.
+        DocumentError: a picture cannot be read.
+    """
+    size = belief.sensor.camera.image_size
+    return see_view(record, session.read_image(record.ring, size),
+                    session.read_image(record.stripe, size), belief,
+                    session.header.boards[record.place].board)

@@ -11,7 +11,7 @@ import cv2
 
 from cell.archive.files import read_text, replace_text, sync
 from cell.archive.images import read_image
-from cell.core.documents.calibration_session import SessionHeader, ViewRecord
+from cell.core.documents.calibration_session import SCHEMA, SessionHeader, ViewRecord
 from cell.core.errors import DocumentError
 from cell.core.observation import Image
 
@@ -44,23 +44,31 @@ class Session:
         """Open a session that was begun before.
 
         Raises:
-            DocumentError: there is none, or it is of a newer version.
+            DocumentError: there is none, or another version of this program began it.
         """
         text = read_text(folder / HEADER)
         try:
             return cls(folder, SessionHeader.model_validate_json(text))
-        except ValueError as error:
-            raise DocumentError(f"not a calibration session: {error}",
-                                source=str(folder / HEADER)) from None
+        except ValueError:
+            raise _of_another_version(folder / HEADER, _version(text)) from None
 
     @property
     def views(self) -> tuple[ViewRecord, ...]:
-        """The views as they were written; a last line that was cut short does not count."""
+        """The views, each as it was taken last; a line that was cut short does not count."""
+        latest = {view.number: view for view in self._lines()}
+        return tuple(latest[number] for number in sorted(latest))
+
+    def takes(self, number: int) -> int:
+        """Count how often a view has been taken."""
+        return sum(view.number == number for view in self._lines())
+
+    def _lines(self) -> list[ViewRecord]:
         file = self.folder / VIEWS
         lines = read_text(file).splitlines() if file.exists() else []
-        whole = [line for line in lines if _is_whole(line)]
-        latest = {view.number: view for view in map(ViewRecord.model_validate_json, whole)}
-        return tuple(latest[number] for number in sorted(latest))
+        try:
+            return [ViewRecord.model_validate_json(line) for line in lines if _is_whole(line)]
+        except ValueError:
+            raise _of_another_version(file, self.header.version) from None
 
     def append(self, view: ViewRecord) -> None:
         """Add a view; on return it is on the disk.
@@ -97,7 +105,6 @@ class Session:
         """Read a picture back."""
         return read_image(self.folder / name, image_size)
 
-
     def conclude(self, outcome: str) -> None:
         """Close the session: it cannot be gone on with."""
         replace_text(self.folder / OUTCOME, outcome + "\n")
@@ -115,6 +122,20 @@ def latest_session(folder: Path, what: str) -> Path:
         raise DocumentError(f"there is no open session of `{what}` to go on with",
                             source=str(folder / "sessions"))
     return sessions[-1]
+
+
+def _of_another_version(file: Path, version: object) -> DocumentError:
+    return DocumentError(f"this session was begun by another version of the program (schema "
+                         f"{version}, here {SCHEMA}) and cannot be gone on with: begin a new one. "
+                         "Its pictures stay where they are; sets made from such sessions stay "
+                         "usable", source=str(file))
+
+
+def _version(text: str) -> object:
+    try:
+        return json.loads(text).get("version", "unknown")
+    except (ValueError, AttributeError):
+        return "unknown"
 
 
 def _is_whole(line: str) -> bool:

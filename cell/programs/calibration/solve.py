@@ -7,25 +7,28 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from cell.core.documents.calibration_session import Precondition
 from cell.core.errors import DocumentError, UnmeasurableError
+from cell.core.geometry import Plane
 from cell.core.optics import CameraModel, SensorModel
 from cell.metrology.board_pose import locate_boards
 from cell.metrology.calibration_gates import Checked, GateSet, Ruling, check_gates, worst
+from cell.metrology.calibration_progress import depth_percent
 from cell.metrology.camera_calibration import TILTED, CameraResult, solve_camera
 from cell.metrology.hand_eye_calibration import HandEyeAnswer, calibrate_hand_eye
 from cell.metrology.hand_eye_session import HandEyeSession
 from cell.metrology.light_plane import LightPlaneResult, StripeOnBoard, solve_light_plane
 from cell.metrology.motions import stack
 from cell.metrology.sphere import SphereResult
-from cell.programs.calibration.belief import Belief, design_of
+from cell.programs.calibration.belief import Belief
+from cell.programs.calibration.chain import Chain
 from cell.programs.calibration.kinematics import KinematicsFound, find_kinematics
 from cell.programs.calibration.recorded import read_gates
-from cell.programs.calibration.seen import SeenView, see_view
+from cell.programs.calibration.seen import SeenView, see_again
 from cell.programs.calibration.session import Session
 from cell.programs.calibration.sphere import check_sphere, see_sphere
 
 STEPS = ("camera", "light plane", "laser path", "sphere")  # hand-eye gives its own reasons
-DEPTH = 44.0  # mm over which a light plane should have been seen: the depth of field
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +36,7 @@ class Solution:
     """All that a session gave; None for what was not asked for and stays as in the active set.
 
     `gates` are by step. `camera` is the one that light plane and hand-eye were solved with.
+    `preconditions` are those that were not met, and accepted.
     """
 
     views: tuple[SeenView, ...]
@@ -42,10 +46,16 @@ class Solution:
     hand_eye: HandEyeAnswer | None = None
     kinematics: KinematicsFound | None = None
     sphere: SphereResult | None = None
+    preconditions: tuple[Precondition, ...] = ()
     gates: dict[str, tuple[Checked, ...]] = field(default_factory=dict)
 
     @property
     def verdict(self) -> Ruling:
+        """The worst verdict over all steps, and over what was there before."""
+        return worst([self.found, "warn"] if self.preconditions else [self.found])
+
+    @property
+    def found(self) -> Ruling:
         """The worst verdict over all steps."""
         findings = () if self.hand_eye is None else self.hand_eye.findings
         return worst([*(gate.verdict for gates in self.gates.values() for gate in gates),
@@ -56,7 +66,8 @@ class Solution:
         """What speaks against it, step by step."""
         camera_and_plane = [f"{step}: {gate}" for step in STEPS
                             for gate in self.gates.get(step, ()) if gate.verdict != "pass"]
-        return (*camera_and_plane, *(() if self.hand_eye is None else self.hand_eye.reasons))
+        hand_eye = () if self.hand_eye is None else self.hand_eye.reasons
+        return (*map(str, self.preconditions), *camera_and_plane, *hand_eye)
 
 
 def solve_session(session: Session, belief: Belief) -> Solution:
@@ -75,17 +86,14 @@ def solve_session(session: Session, belief: Belief) -> Solution:
 
 def see_views(session: Session, belief: Belief) -> tuple[SeenView, ...]:
     """Detect board and stripe in every usable view of a session."""
-    size = belief.sensor.camera.image_size
-    return tuple(see_view(view, session.read_image(view.ring, size),
-                          session.read_image(view.stripe, size), belief,
-                          design_of(session.header.board))
-                 for view in session.views
-                 if view.status == "ok" and view.purpose in ("fit", "hold_out"))
+    return tuple(see_again(view, session, belief) for view in session.views
+                 if view.status == "ok" and view.purpose != "sphere")
 
 
-def _solve(views: tuple[SeenView, ...], session: Session, belief: Belief,
+def _solve(seen: tuple[SeenView, ...], session: Session, belief: Belief,
            gates: GateSet) -> Solution:
     what = session.header.what
+    views = tuple(view for view in seen if view.record.place == 0)
     fitted = [view for view in views if view.record.purpose == "fit"]
     checks, camera_result, plane, answer = dict[str, tuple[Checked, ...]](), None, None, None
     camera = belief.sensor.camera
@@ -99,9 +107,10 @@ def _solve(views: tuple[SeenView, ...], session: Session, belief: Belief,
     if what in ("hand-eye", "all"):
         answer = _hand_eye(views, camera, gates)
         checks["hand-eye"] = answer.gates
-    found = (find_kinematics(views, camera, answer, belief)
+    found = (find_kinematics(seen, camera, answer, belief)
              if session.header.plan.kinematics and answer else None)
-    solution = Solution(views, camera, camera_result, plane, answer, found, gates=checks)
+    solution = Solution(views, camera, camera_result, plane, answer, found, gates=checks,
+                        preconditions=session.header.warnings)
     missed = laser_path_rms(solution, belief)
     if not np.isnan(missed):
         checks["laser path"] = check_gates({"laser_path_mm": missed}, gates.hand_eye)
@@ -111,16 +120,16 @@ def _solve(views: tuple[SeenView, ...], session: Session, belief: Belief,
 def _with_sphere(solution: Solution, session: Session, belief: Belief,
                  gates: GateSet) -> Solution:
     """Check what was solved on the sphere, where the session has one."""
-    sphere, answer = session.header.sphere, solution.hand_eye
+    sphere = session.header.sphere
     if sphere is None:
         return solution
     plane = solution.light_plane.plane if solution.light_plane else belief.sensor.light_plane
-    mount = (answer.held_out.result.carrier_from_camera if answer and answer.held_out
-             else belief.flange_from_camera)
     size = belief.sensor.camera.image_size
-    looks = [see_sphere(session.read_image(view.stripe, size), view.pose, sphere, belief)
+    looks = [see_sphere(session.read_image(view.stripe, size), view.pose, view.joints, sphere,
+                        belief)
              for view in session.views if view.status == "ok" and view.purpose == "sphere"]
-    check = check_sphere(looks, sphere, SensorModel(solution.camera, plane), mount, gates.sphere)
+    check = check_sphere(looks, sphere, SensorModel(solution.camera, plane), chain_of(
+        solution, belief), gates.sphere)
     return replace(solution, sphere=check.result,
                    gates=solution.gates | {"sphere": check.gates})
 
@@ -146,19 +155,40 @@ def laser_path_rms(solution: Solution, belief: Belief) -> float:
     """Measure the board through the laser, in views that nothing was fitted to: mm off it, rms.
 
     The stripe goes the way of every measurement: light plane, camera, flange, base; the board is
-    where the hand-eye fit has it. Not a number where there is no such view.
+    where the views of the fit have it. Not a number where there is no such view.
     """
     answer = solution.hand_eye
     if answer is None or answer.held_out is None:
         return float("nan")
     plane = solution.light_plane.plane if solution.light_plane else belief.sensor.light_plane
-    result = answer.held_out.result
-    unseen = [view for view in solution.views if view.record.number in answer.apart]
+    chain, views = chain_of(solution, belief), solution.views
+    board = _board_in_base([view for view in views if view.record.number in answer.used],
+                           solution.camera, chain)
     heights = [
-        (result.reference_from_board.inverse @ view.record.pose @ result.carrier_from_camera
-         @ plane.meet(solution.camera.rays(view.stripe)))[:, 2]
-        for view in unseen if view.stripe is not None]
+        board.distance(chain.base_from_camera(view.record.pose, view.record.joints)
+                       @ plane.meet(solution.camera.rays(view.stripe)))
+        for view in views if view.record.number in answer.apart and view.stripe is not None]
     return float(np.sqrt(np.mean(np.concatenate(heights) ** 2))) if heights else float("nan")
+
+
+def _board_in_base(views: Sequence[SeenView], camera: CameraModel, chain: Chain) -> Plane:
+    """Lay the board's plane through where the views have its corners, on average."""
+    three = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0], [0.0, 100.0, 0.0]])
+    boards = locate_boards([view.board for view in views], camera)
+    origin, along, down = np.mean(
+        [chain.base_from_camera(view.record.pose, view.record.joints) @ board.camera_from_board
+         @ three for view, board in zip(views, boards, strict=True)], axis=0)
+    return Plane.through(origin, np.cross(along - origin, down - origin))
+
+
+def chain_of(solution: Solution, belief: Belief) -> Chain:
+    """Say how a set of this solution carries a point to the base; what was not solved stays."""
+    answer = solution.hand_eye
+    if answer is None or answer.held_out is None:
+        return belief.chain
+    if solution.kinematics is not None and solution.kinematics.useful:
+        return Chain(solution.kinematics.result.flange_from_camera, solution.kinematics.document)
+    return Chain(answer.held_out.result.carrier_from_camera)
 
 
 def camera_figures(result: CameraResult) -> dict[str, float]:
@@ -171,8 +201,7 @@ def camera_figures(result: CameraResult) -> dict[str, float]:
 
 def plane_figures(result: LightPlaneResult) -> dict[str, float]:
     """What the gates of the light plane look at."""
-    near, far = result.depths
-    return {"poses": len(result.residuals), "depth_percent": min(100.0, 100 * (far - near) / DEPTH),
+    return {"poses": len(result.residuals), "depth_percent": depth_percent(result.depths),
             "rms_mm": result.rms, "left_out_mm": result.left_out_rms,
             "normal_sigma_deg": float(np.degrees(result.normal_sigma))}
 

@@ -13,19 +13,21 @@ from cell.core.errors import UnmeasurableError
 from cell.core.geometry import Array, Transform
 from cell.core.observation import Image
 from cell.core.optics import SensorModel
-from cell.core.ports import Operator
+from cell.core.ports import Joints, Operator
 from cell.metrology.calibration_gates import Checked, Gate, check_gates
 from cell.metrology.detect_sphere_stripe import detect_sphere_stripe
 from cell.metrology.sphere import SphereProblem, SphereResult, solve_sphere
 from cell.programs.calibration.belief import Belief
+from cell.programs.calibration.chain import Chain
 
 
 @dataclass(frozen=True, eq=False)
 class SphereLook:
-    """The stripe on a sphere, pixels (n, 2), and where the flange stood."""
+    """The stripe on a sphere, pixels (n, 2), and where the flange stood, as it was reported."""
 
     pixels: Array
     base_from_flange: Transform
+    joints: Joints
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,24 +47,24 @@ def choose_sphere(plan: CalibrationPlan, belief: Belief,
     return next(iter(belief.targets.spheres), None) if plan.sphere_views else None
 
 
-def see_sphere(stripe: Image, base_from_flange: Transform, sphere: SphereDocument,
+def see_sphere(stripe: Image, base_from_flange: Transform, joints: Joints, sphere: SphereDocument,
                belief: Belief) -> SphereLook:
-    """Detect the stripe on a sphere in a picture.
+    """Detect the stripe on a sphere in a picture taken from a flange pose as it was reported.
 
     Raises:
         UnmeasurableError: no stripe where the sphere must be.
     """
-    camera_from_base = (base_from_flange @ belief.flange_from_camera).inverse
+    camera_from_base = belief.chain.base_from_camera(base_from_flange, joints).inverse
     pixels = detect_sphere_stripe(stripe, belief.sensor, camera_from_base @ np.array(sphere.centre),
                                   sphere.radius_mm)
-    return SphereLook(pixels, base_from_flange)
+    return SphereLook(pixels, base_from_flange, joints)
 
 
 def check_sphere(looks: Sequence[SphereLook], sphere: SphereDocument, sensor: SensorModel,
-                 flange_from_camera: Transform, gates: dict[str, Gate]) -> SphereCheck:
+                 chain: Chain, gates: dict[str, Gate]) -> SphereCheck:
     """Carry every stripe to the base as measuring does, and hold the sphere against its gates."""
     sections = tuple(
-        look.base_from_flange @ flange_from_camera
+        chain.base_from_camera(look.base_from_flange, look.joints)
         @ sensor.light_plane.meet(sensor.camera.rays(look.pixels)) for look in looks)
     try:
         result = solve_sphere(SphereProblem(sections, sphere.radius_mm, np.array(sphere.centre)))

@@ -49,11 +49,11 @@ def _take_both(station: Station, exposures: Mapping[Light, float], attempt: int,
     station.pause(station.document.robot.settle_s, since=arrived)
     _let_rise(station, lit)
     before = station.robot.state()
-    hole, hole_time = _snap(station, exposures["ring"])
+    hole, hole_time = snap(station, exposures["ring"])
     lit = _light_up(station, "laser")
     between = station.robot.state()
     _let_rise(station, lit)
-    stripe, stripe_time = _snap(station, exposures["laser"])
+    stripe, stripe_time = snap(station, exposures["laser"])
     after = station.robot.state()
     return (View(hole, "ring", exposures["ring"], hole_time, before.base_from_flange,
                  between.base_from_flange, before.joints, attempt),
@@ -71,7 +71,7 @@ def _let_rise(station: Station, lit: float) -> None:
     station.pause(station.document.robot.light_rise_s, since=lit)
 
 
-def _snap(station: Station, exposure: float) -> tuple[Image, float]:
+def snap(station: Station, exposure: float) -> tuple[Image, float]:
     """Expose once and return the picture and the time at which it was asked for."""
     tries = TRIES
     while True:
