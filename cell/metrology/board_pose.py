@@ -19,6 +19,7 @@ from cell.core.optics import CameraModel
 from cell.metrology.motions import nudge
 
 FEWEST_CORNERS = 6
+ON_A_LINE = 0.02        # breadth of the corners over their length
 AMBIGUOUS_RATIO = 2.0   # of the pixel residuals of the two poses
 LEAST_CORNER_SIGMA = 0.02  # px: no detector is better, however few corners agree by chance
 STEP = 1e-6             # of the numerical derivative, rad and mm
@@ -30,6 +31,12 @@ class BoardView:
 
     points_in_board: Array
     pixels: Array
+
+    @property
+    def carries_pose(self) -> bool:
+        """Whether there are enough corners, and they do not lie on a line."""
+        return len(self.pixels) >= FEWEST_CORNERS and all(
+            _breadth(points) > ON_A_LINE for points in (self.points_in_board, self.pixels))
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,38 +91,49 @@ def pose_information(points_in_board: Array, camera_from_board: Transform,
 
 
 def _both_poses(view: BoardView, camera: CameraModel) -> list[tuple[Transform, Array]]:
-    if len(view.pixels) < FEWEST_CORNERS:
+    if not view.carries_pose:
         raise UnmeasurableError("too_few_corners", f"{len(view.pixels)} corners; a board pose "
-                                                   f"needs {FEWEST_CORNERS}")
+                                                   f"needs {FEWEST_CORNERS}, not on one line")
     rays = camera.normalise(view.pixels)
     count, turns, shifts, _ = cv2.solvePnPGeneric(
         view.points_in_board, rays, np.eye(3), None, flags=cv2.SOLVEPNP_IPPE)
-    poses = [_refine(view, camera, rays, turn, shift)
-             for turn, shift in zip(turns, shifts, strict=True)] if count else []
+    refined = [_refine(view, rays, turn, shift)
+               for turn, shift in zip(turns, shifts, strict=True)] if count else []
+    poses = [(pose, camera.project(pose @ view.points_in_board) - view.pixels)
+             for pose in refined if pose]
     good = [pose for pose in poses if np.isfinite(pose[1]).all()]
     if not good:
         raise UnmeasurableError("no_pose", "the corners do not fit a flat board")
     return sorted(good, key=_misfit)
 
 
-def _refine(view: BoardView, camera: CameraModel, rays: Array, turn: Array,
-            shift: Array) -> tuple[Transform, Array]:
+def _refine(view: BoardView, rays: Array, turn: Array, shift: Array) -> Transform | None:
     """Refine on undistorted pixels: the same corners, without the distortion's slow inverse."""
     turn, shift = cv2.solvePnPRefineLM(view.points_in_board, rays, np.eye(3), None, turn, shift)
-    camera_from_board = Transform.from_parts(turn.ravel(), shift.ravel())
-    return camera_from_board, camera.project(camera_from_board @ view.points_in_board) - view.pixels
+    if not (np.isfinite(turn).all() and np.isfinite(shift).all()):
+        return None
+    return Transform.from_parts(turn.ravel(), shift.ravel())
 
 
 def _with_covariance(view: BoardView, poses: list[tuple[Transform, Array]], camera: CameraModel,
                      sigma: float) -> BoardPose:
     def pose(of: tuple[Transform, Array], alternative: BoardPose | None = None) -> BoardPose:
         information = pose_information(view.points_in_board, of[0], camera, sigma)
-        covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
+        try:
+            covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
+        except np.linalg.LinAlgError:
+            raise UnmeasurableError("no_pose", "the camera folds the board's image") from None
         return BoardPose(of[0], covariance, view.points_in_board, of[1], alternative)
 
     if len(poses) > 1 and _misfit(poses[1]) < AMBIGUOUS_RATIO ** 2 * _misfit(poses[0]):
         return pose(poses[0], pose(poses[1]))
     return pose(poses[0])
+
+
+def _breadth(points: Array) -> float:
+    """How broad points (n, 2 or 3) lie, over how long; 0 where all are one point."""
+    length, breadth, *_ = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return float(breadth / length) if length > 0.0 else 0.0
 
 
 def _misfit(pose: tuple[Transform, Array]) -> float:

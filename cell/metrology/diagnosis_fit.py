@@ -9,8 +9,8 @@ import numpy as np
 from cell.core.errors import UnmeasurableError
 from cell.metrology.calibration_gates import Gate
 from cell.metrology.camera_calibration import FREE, CameraResult, solve_camera
-from cell.metrology.diagnosis import Finding
 from cell.metrology.explanations import Explanation, find_bump
+from cell.metrology.finding import Finding
 from cell.metrology.hand_eye import HandEyeProblem, HandEyeResult, RobotNoise
 from cell.metrology.hand_eye_check import object_rms
 from cell.metrology.hand_eye_session import HandEyeSession
@@ -47,13 +47,17 @@ class CameraCheck:
         return self.better > BETTER and (shifted or harmful)
 
 
-def check_camera(session: HandEyeSession) -> CameraCheck | None:
-    """Calibrate the camera from the session's own corners and compare; None where they are few."""
+def check_camera(session: HandEyeSession, sound: HandEyeSession) -> CameraCheck | None:
+    """Calibrate the camera from the session's own corners and compare; None where they are few.
+
+    A view whose robot pose is wrong still tells of the camera: how still the board stands is judged
+    by the `sound` views alone.
+    """
     if session.camera is None:
         return None
     try:
         own = solve_camera(session.views, session.camera.image_size, session.camera)
-        again = session.with_camera(own.camera)
+        again = sound.with_camera(own.camera)
     except (UnmeasurableError, np.linalg.LinAlgError):
         return None
     step = (own.camera.matrix - session.camera.matrix)[[0, 1, 0, 1], [0, 1, 2, 2]]
@@ -61,7 +65,7 @@ def check_camera(session: HandEyeSession) -> CameraCheck | None:
     return CameraCheck(own, _better(session, own),
                        float(np.abs(step).max() / session.camera.matrix[0, 0]),
                        float(np.abs(step / sigmas).max()),
-                       session.pnp_rms_px, _still(session), _still(again))
+                       session.pnp_rms_px, _still(sound), _still(again))
 
 
 def judge_camera(check: CameraCheck | None, split_half: Gate) -> list[Finding]:
@@ -86,17 +90,16 @@ def judge_camera(check: CameraCheck | None, split_half: Gate) -> list[Finding]:
 def judge_board(session: HandEyeSession, problem: HandEyeProblem,
                 result: HandEyeResult) -> list[Finding]:
     """Say whether the board seems to have moved during the session."""
-    bump = find_bump(problem, result)
-    if (bump is None or result.chi2 < NOT_NOISE or bump.shift < LEAST_BUMP
-            or bump.explanation.better < JUMP):
+    bump, noisy = find_bump(problem, result), bool(session.views) and result.chi2 < NOT_NOISE
+    if bump is None or noisy or bump.shift < LEAST_BUMP or bump.explanation.better < JUMP:
         return []
     certain = bump.explanation.chi2 < HALVED * result.chi2
     return [Finding("board_moved", "refuse" if certain else "warn",
                     "the residuals jump between view "
                     f"{session.numbers[bump.after_view]} and view "
                     f"{session.numbers[bump.before_view]}: the board seems to have moved by "
-                    f"{bump.shift:.2f} mm (misfit {result.chi2:.1f}, with that "
-                    f"{bump.explanation.chi2:.1f}). If so, fix it and begin again.")]
+                    f"{bump.shift:.2f} mm (misfit {result.chi2:.2g}, with that "
+                    f"{bump.explanation.chi2:.2g}). If so, fix it and begin again.")]
 
 
 def judge_views(session: HandEyeSession, problem: HandEyeProblem,

@@ -6,14 +6,10 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias
 
+import numpy as np
+
 from cell.metrology.calibration_gates import Checked, GateSet, check_gates, worst
-from cell.metrology.diagnosis import (
-    Finding,
-    contradicting_views,
-    diagnose,
-    moved_views,
-    ruled_worst,
-)
+from cell.metrology.diagnosis import CLEARLY, diagnose
 from cell.metrology.diagnosis_fit import (
     check_camera,
     judge_board,
@@ -22,6 +18,7 @@ from cell.metrology.diagnosis_fit import (
     judge_views,
 )
 from cell.metrology.explanations import estimate_board_scale
+from cell.metrology.finding import Finding
 from cell.metrology.hand_eye import HandEyeProblem, Mount, solve_hand_eye
 from cell.metrology.hand_eye_check import HeldOut, solve_and_hold_out, solve_apart
 from cell.metrology.hand_eye_figures import fit_figures, input_figures, what_limits
@@ -29,6 +26,7 @@ from cell.metrology.hand_eye_session import HandEyeSession
 
 Answer: TypeAlias = Literal["pass", "refuse", "solved"]
 
+FIRST = ("intrinsics", "preview")
 ENOUGH_VIEWS = 12  # below it a solution is a preview that cannot be activated
 
 
@@ -89,49 +87,83 @@ def calibrate_hand_eye(session: HandEyeSession, gates: GateSet,
     Board poses without corners are solved and not judged: nothing says what they are worth. The
     views numbered `apart` are never fitted; without any, some are chosen.
     """
-    moved = moved_views(session)
-    steady = session.without(moved)
-    gross = contradicting_views(steady)
-    standing = steady.without(gross)
-    left_out = _numbers(session, moved) + _numbers(steady, gross)
-    findings = [*diagnose(standing), *moved.values(), *gross.values()]
-    if ruled_worst(findings) == "refuse":
-        return HandEyeAnswer("refuse", session.mount, tuple(findings), left_out=left_out)
-    problem = standing.problem(gates.robot.noise)
+    diagnosis = diagnose(session)
+    sound = diagnosis.sound
+    left_out = tuple(sorted(set(session.numbers) - set(sound.numbers)))
+    if not diagnosis.solvable:
+        findings = (*_spoilt_camera(sound, diagnosis.findings, gates), *diagnosis.findings)
+        return HandEyeAnswer("refuse", session.mount, findings, left_out=left_out)
+    problem = sound.problem(gates.robot.noise)
     whole = solve_hand_eye(problem)
-    kept = standing.without(whole.dropped)
-    answer = _judged(kept, gates, apart) if session.views else _solved(kept, gates)
-    about = [*(judge_board(standing, problem, whole) if session.views else []),
-             *judge_views(standing, problem, whole), *findings]
-    return _with(answer, about, left_out + _numbers(standing, whole.dropped))
+    kept = sound.without(whole.dropped)
+    about = (*judge_board(sound, problem, whole), *judge_views(sound, problem, whole),
+             *diagnosis.findings)
+    answer = _judged(session, kept, gates, apart) if session.views else _solved(kept, gates)
+    return _with(answer, about, left_out + _numbers(sound, whole.dropped))
+
+
+def _spoilt_camera(session: HandEyeSession, findings: Iterable[Finding],
+                   gates: GateSet) -> list[Finding]:
+    """Look at the camera where nothing else explains why robot and camera show no one motion."""
+    if "unrelated" not in {finding.code for finding in findings}:
+        return []
+    limit = gates.hand_eye["pnp_rms_px"].refuse_above or np.inf
+    camera = check_camera(session, session)
+    if camera is not None and camera.object_rms_own < CLEARLY * camera.object_rms_given:
+        return judge_camera(camera, gates.hand_eye["split_half_percent"])
+    if session.pnp_rms_px < limit:
+        return []
+    return [Finding("corners", "refuse", "the corners are of no flat board before any camera: they "
+                    f"miss it by {session.pnp_rms_px:.3g} px. Are they numbered alike in object "
+                    "and image, and are pixels given as (x, y)?")]
 
 
 def _solved(session: HandEyeSession, gates: GateSet) -> HandEyeAnswer:
-    problem = session.problem(gates.robot.noise)
-    held_out = solve_and_hold_out(problem)
-    return HandEyeAnswer("solved", session.mount, (), (), held_out,
-                         fit_figures(session, problem, held_out), problem, session.numbers)
+    problem = _as_scattered(session.problem(gates.robot.noise))
+    held_out, whole = solve_and_hold_out(problem), solve_hand_eye(problem)
+    found = [*judge_scale(estimate_board_scale(problem, whole), whole.chi2,
+                          gates.hand_eye["board_scale_percent"]), *_preview(session)]
+    return HandEyeAnswer("solved", session.mount,
+                         tuple(replace(finding, verdict="warn") for finding in found), (),
+                         held_out, fit_figures(session, problem, held_out), problem,
+                         session.numbers)
 
 
-def _judged(session: HandEyeSession, gates: GateSet, apart: Collection[int]) -> HandEyeAnswer:
-    problem = session.problem(gates.robot.noise)
-    kept_apart = [index for index, number in enumerate(session.numbers) if number in apart]
+def _as_scattered(problem: HandEyeProblem) -> HandEyeProblem:
+    """Let the misfit say what board poses are worth that came without their corners."""
+    chi2 = solve_hand_eye(problem).chi2
+    return replace(problem, views=tuple(
+        replace(view, board=replace(view.board, covariance=chi2 * view.board.covariance))
+        for view in problem.views))
+
+
+def _judged(session: HandEyeSession, sound: HandEyeSession, gates: GateSet,
+            apart: Collection[int]) -> HandEyeAnswer:
+    problem = sound.problem(gates.robot.noise)
+    kept_apart = [index for index, number in enumerate(sound.numbers) if number in apart]
     held_out = solve_apart(problem, kept_apart) if kept_apart else solve_and_hold_out(problem)
     whole = solve_hand_eye(problem)
     scale = estimate_board_scale(problem, whole)
-    camera = check_camera(session)
-    figures = {**input_figures(session, camera, scale), **fit_figures(session, problem, held_out)}
+    camera = check_camera(session, sound)
+    figures = {**input_figures(sound, camera, scale), **fit_figures(sound, problem, held_out)}
     limits = gates.hand_eye
-    found = [*judge_camera(camera, limits["split_half_percent"]), *_preview(session),
+    found = [*judge_camera(camera, limits["split_half_percent"]), *_preview(sound),
              *judge_scale(scale, whole.chi2, limits["board_scale_percent"])]
     return HandEyeAnswer("pass", session.mount, tuple(found), check_gates(figures, limits),
-                         held_out, figures, problem, session.numbers,
+                         held_out, figures, problem, sound.numbers,
                          limited_by=what_limits(figures, camera, limits))
 
 
-def _with(answer: HandEyeAnswer, about: list[Finding], left_out: tuple[int, ...]) -> HandEyeAnswer:
-    """Add what was found of the input, and draw the verdict from everything together."""
-    findings = (*answer.findings, *about)
+def _with(answer: HandEyeAnswer, about: tuple[Finding, ...],
+          left_out: tuple[int, ...]) -> HandEyeAnswer:
+    """Add what was found of the views, and draw the verdict from everything together.
+
+    The camera comes first, since it spoils everything else; then the views; the board's size last,
+    since it may be mimicked by any of them.
+    """
+    first = tuple(finding for finding in answer.findings if finding.code in FIRST)
+    last = tuple(finding for finding in answer.findings if finding.code not in FIRST)
+    findings = (*first, *about, *last)
     ruling = worst([*(finding.verdict for finding in findings),
                     *(gate.verdict for gate in answer.gates)])
     verdict = "refuse" if ruling == "refuse" else answer.verdict

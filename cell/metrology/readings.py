@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from cell.core.geometry import Array
 from cell.metrology.arrays import Indices
+from cell.metrology.conventions import choose_branches, other_meanings, turns_between
 from cell.metrology.hand_eye import Mount
 from cell.metrology.hand_eye_start import pairs, useful_pairs
 from cell.metrology.motions import inverse, nearest_rotation, rotation_vectors
@@ -24,7 +25,6 @@ LEVER = 50.0        # mm: a rotation counts by what it moves at the edge of a bo
 SHIFTS = (1, -1, 2, -2, 3, -3)
 SWAPS_TRIED = 3
 FEWEST_COMMON = 4   # views that a shift must leave
-EULER = ("xyz", "XYZ", "zyx", "ZYX")
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,9 +90,10 @@ def other_readings(given: Reading) -> Iterator[Reading]:
     yield from _swapped(given)
     yield replace(given, code="lists_reversed", camera_from_board=boards[::-1],
                   says="image and pose lists do not belong together: one of them runs backwards")
-    for meant, turns in _meant(robot[:, :3, :3]):
+    seen = _pair_turns(boards)
+    for meant, candidates in other_meanings(robot[:, :3, :3]):
         poses = robot.copy()
-        poses[:, :3, :3] = turns
+        poses[:, :3, :3] = choose_branches(candidates, seen)
         yield replace(given, code="rotation_convention", base_from_flange=poses,
                       says=f"rotation convention: the robot's rotations look like {meant}")
 
@@ -133,29 +134,6 @@ def _swapped(given: Reading) -> Iterator[Reading]:
                       says=f"views {i} and {j} look exchanged")
 
 
-def _meant(matrices: Array) -> Iterator[tuple[str, Array]]:
-    """List what the rotations (n, 3, 3) may have been before they were read wrongly."""
-    given = Rotation.from_matrix(matrices)
-    for axes in EULER:
-        yield (f"rotation vectors that were read as Euler angles {axes}",
-               Rotation.from_rotvec(_vectors_from_euler(given, axes)).as_matrix())
-        yield (f"Euler angles {axes} that were read as rotation vectors",
-               Rotation.from_euler(axes, given.as_rotvec()).as_matrix())
-    for order in ([3, 0, 1, 2], [1, 2, 3, 0]):
-        yield ("quaternions with the scalar at the other end",
-               Rotation.from_quat(given.as_quat()[:, order]).as_matrix())
-    yield "transposed matrices", np.swapaxes(matrices, 1, 2)
-
-
-def _vectors_from_euler(given: Rotation, axes: str) -> Array:
-    """Undo a reading of rotation vectors as Euler angles: the branch that is a short vector."""
-    angles = given.as_euler(axes)
-    other = np.stack([angles[:, 0] + np.pi, np.pi - angles[:, 1], angles[:, 2] + np.pi], axis=1)
-    other = (other + np.pi) % (2.0 * np.pi) - np.pi
-    longer = np.linalg.norm(angles, axis=1) > np.linalg.norm(other, axis=1)
-    return np.where(longer[:, None], other, angles)
-
-
 def _park_with_scale(M: Array, B: Array) -> tuple[Array, Array, float]:
     A, B = useful_pairs(M, B)
     rotation = nearest_rotation(rotation_vectors(A).T @ rotation_vectors(B))
@@ -176,8 +154,7 @@ def _spread(boards: Array) -> float:
 def _pair_turns(poses: Array) -> Array:
     """The angle (n, n) between every two views, which is the same from either end."""
     turns = poses[:, :3, :3]
-    traces = np.einsum("aij,bij->ab", turns, turns)
-    return np.arccos(np.clip((traces - 1.0) / 2.0, -1.0, 1.0))
+    return turns_between(turns[:, None], turns[None])
 
 
 def _exchanged(count: int, i: int, j: int) -> Indices:

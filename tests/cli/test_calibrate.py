@@ -1,5 +1,6 @@
 """`cell calibrate hand-eye --from`: the recorded sessions of real robots, and spoilt folders."""
 
+import io
 import json
 import shutil
 
@@ -95,6 +96,19 @@ def test_a_session_in_metres_is_named_and_not_corrected(solve, copy):
     assert "in m," in answer["reasons"][0]
 
 
+NO_CAMERA = """
+image_size: [1600, 1200]
+camera_matrix: [[0, 0, 800], [0, 0, 600], [0, 0, 1]]
+distortion: [0, 0, 0, 0, 0]
+"""
+
+
+def an_array():
+    stream = io.BytesIO()
+    np.save(stream, np.zeros(3))
+    return stream.getvalue()
+
+
 def spoil_rows(folder):
     file = folder / "base_from_flange.csv"
     file.write_text("\n".join(file.read_text().splitlines()[:-1]))
@@ -123,6 +137,12 @@ def spoil_number(folder):
                              image_px=np.zeros((14, 3, 2))), "expected object_mm (view,"),
     (lambda folder: (folder / "camera.yaml").write_text("image_size: [1, 2]"), "camera_matrix"),
     (lambda folder: (folder / "expected.yaml").write_text("camera_mount: roof"), "roof"),
+    (lambda folder: (folder / "views.npz").write_bytes(an_array()), "not a readable .npz"),
+    (lambda folder: np.savez(folder / "views.npz", object_mm=np.zeros((14, 3, 3), complex),
+                             image_px=np.zeros((14, 3, 2))), "expected real numbers"),
+    (lambda folder: np.savez(folder / "views.npz", object_mm=np.zeros((14, 8, 3)),
+                             image_px=np.zeros((14, 8, 2))), "not on one line"),
+    (lambda folder: (folder / "camera.yaml").write_text(NO_CAMERA), "fx, fy > 0"),
     (spoil_rows, "13 robot poses but 14 views"),
     (spoil_rotation, "line 4"),
     (spoil_number, "line 3"),

@@ -86,6 +86,17 @@ def test_euler_angles_read_as_rotation_vectors(good):
     assert "Euler angles xyz that were" in refused(spoiled, "rotation_convention").reasons[0]
 
 
+@pytest.mark.parametrize(("read", "said"), [
+    (lambda r: Rotation.from_rotvec(r.as_euler("ZYX")), "angles ZYX that were read as rotation v"),
+    (lambda r: Rotation.from_euler("xyz", r.as_euler("ZYX")), "that were read as Euler angles"),
+    (lambda r: Rotation.from_euler("zyx", r.as_euler("ZYZ")), "Euler angles ZYZ that were read as"),
+    (lambda r: Rotation.from_rotvec(np.radians(r.as_rotvec())), "in radians that were read as deg"),
+    (lambda r: Rotation.from_rotvec(np.degrees(r.as_rotvec())), "in degrees that were read as rad"),
+])
+def test_other_conventions_of_rotation(good, read, said):
+    assert said in refused(turned(good, read), "rotation_convention").reasons[0]
+
+
 def test_quaternions_in_another_order(good):
     spoiled = turned(good, lambda given: Rotation.from_quat(given.as_quat()[:, [3, 0, 1, 2]]))
     assert "quaternions" in refused(spoiled, "rotation_convention").reasons[0]
@@ -184,6 +195,94 @@ def test_the_robot_moved_during_an_exposure(good):
     answer = calibrate_hand_eye(replace(good, after=after), FINE)
     assert answer.left_out == (5, 9)
     assert [finding.code for finding in answer.findings] == ["robot_moved", "robot_moved"]
+
+
+def again(good, rows):
+    """The session with some of its views in place of others: pose and picture."""
+    return HandEyeSession.seen(good.base_from_flange[rows], tuple(good.views[row] for row in rows),
+                               good.camera, good.mount)
+
+
+def test_a_view_that_is_there_twice_counts_once(good):
+    answer = calibrate_hand_eye(again(good, [*range(20), 3, 8]), FINE)
+    assert answer.left_out == (20, 21) and answer.verdict == "pass"
+    assert answer.reasons[0].startswith("view 20 is view 3 once more")
+    refused(again(good, [*range(10), *range(10)]), "preview")
+    refused(again(good, [0, 1, 2, 3, 4] * 4), "too_few_views")
+
+
+def test_an_old_pose_and_an_old_picture(good):
+    def stay(poses):
+        poses[7] = poses[6]
+
+    answer = calibrate_hand_eye(robot(good, stay), FINE)
+    assert answer.left_out == (7,) and answer.verdict == "pass"
+    assert answer.reasons[0].startswith("views 6 and 7 have the same robot pose but not")
+    views = tuple(good.views[6 if row == 7 else row] for row in range(20))
+    answer = calibrate_hand_eye(HandEyeSession.seen(good.base_from_flange, views, good.camera,
+                                                    good.mount), FINE)
+    assert answer.reasons[0].startswith("views 6 and 7 have the same picture but not")
+
+
+def test_a_blurred_picture_is_left_out(good):
+    noise = np.random.default_rng(1).normal(0.0, 0.5, good.views[4].pixels.shape)
+    views = list(good.views)
+    views[4] = BoardView(views[4].points_in_board, views[4].pixels + noise)
+    answer = calibrate_hand_eye(HandEyeSession.seen(good.base_from_flange, tuple(views),
+                                                    good.camera, good.mount), FINE)
+    assert answer.left_out == (4,) and answer.findings[0].code == "poor_picture"
+
+
+def test_a_bad_view_does_not_change_what_is_said_of_the_camera(good):
+    def move(poses):
+        poses[7, :3, 3] += 40.0
+
+    whole, spoilt = (calibrate_hand_eye(one, FINE) for one in (good, robot(good, move)))
+    assert spoilt.left_out == (7,)
+    assert spoilt.figures["split_half_percent"] == pytest.approx(
+        whole.figures["split_half_percent"], rel=1e-4)
+
+
+def test_a_camera_for_pictures_of_another_size(good):
+    half = CameraModel((1224, 1024), WIDE.matrix * [[0.5], [0.5], [1.0]], WIDE.distortion)
+    assert "beside a picture" in refused(good.with_camera(half), "intrinsics").reasons[0]
+    views = tuple(BoardView(view.points_in_board, view.pixels / 2) for view in good.views)
+    shrunk = HandEyeSession.seen(good.base_from_flange, views, good.camera, good.mount)
+    assert "do not fit these pictures" in refused(shrunk, "intrinsics").reasons[0]
+
+
+def test_corners_that_are_numbered_otherwise(good):
+    order = np.random.default_rng(2).permutation(88)
+    views = tuple(BoardView(view.points_in_board, view.pixels[order[order < len(view.pixels)]])
+                  for view in good.views)
+    spoilt = HandEyeSession.seen(good.base_from_flange, views, good.camera, good.mount)
+    assert "no flat board" in refused(spoilt, "corners").reasons[0]
+
+
+def poses_alone(good):
+    return HandEyeSession.of_poses(good.base_from_flange,
+                                   stack(board.camera_from_board for board in good.boards),
+                                   good.mount)
+
+
+def test_poses_alone_are_looked_through_as_well(good):
+    alone = poses_alone(good)
+    answer = calibrate_hand_eye(alone, FINE)
+    assert (answer.verdict, answer.reasons) == ("solved", ())
+    boards = stack(board.camera_from_board for board in alone.boards)
+    boards[:, :3, 3] /= 1.02
+    larger = HandEyeSession.of_poses(alone.base_from_flange, boards, alone.mount)
+    answer = calibrate_hand_eye(larger, FINE)
+    assert (answer.verdict, answer.findings[0].code) == ("solved", "board_scale")
+    assert re.match(r"the board is (1.[89]|2.[0-3]) % larger", answer.reasons[0])
+    few = calibrate_hand_eye(alone.without(range(9, 20)), FINE)
+    assert (few.verdict, few.findings[0].code) == ("solved", "preview")
+
+
+def test_views_that_only_shift_say_so():
+    still = session(cone_deg=0.01, roll_deg=0.01)
+    answer = refused(still, "degenerate_rotations")
+    assert "hardly turn at all" in answer.reasons[0] and answer.left_out == ()
 
 
 def test_parallel_axes_name_the_missing_motion():

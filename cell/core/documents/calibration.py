@@ -20,21 +20,12 @@ Covariance: TypeAlias = tuple[tuple[Number, ...], ...]
 SLANT = (float(np.sin(np.radians(1.0))), float(np.sin(np.radians(80.0))))  # of alpha
 
 
-class SensorDocument(Document):
-    """`sensor.yaml`: the camera and the light plane, in the camera frame, mm and px.
-
-    Covariances are optional; without them the sensor counts as exact. `camera_covariance` is 9x9
-    over fx, fy, cx, cy, k1, k2, p1, p2, k3; `light_plane_covariance` 4x4 over the plane normalised
-    to a unit normal.
-    """
+class CameraDocument(Document):
+    """A camera alone: image size (width, height) and matrix in px, distortion as OpenCV has it."""
 
     image_size: tuple[Pixels, Pixels]
     camera_matrix: Matrix3
     distortion: tuple[Number, Number, Number, Number, Number]
-    light_plane: Vector4
-    camera_covariance: Covariance | None = None
-    light_plane_covariance: Covariance | None = None
-    serial: str | None = None
 
     @field_validator("camera_matrix")
     @classmethod
@@ -43,6 +34,25 @@ class SensorDocument(Document):
         if not (fx > 0.0 and fy > 0.0 and below == 0.0 and last == (0.0, 0.0, 1.0)):
             raise ValueError("expected [[fx, skew, cx], [0, fy, cy], [0, 0, 1]] with fx, fy > 0")
         return rows
+
+    @property
+    def camera(self) -> CameraModel:
+        """The camera as mathematics uses it."""
+        return CameraModel(self.image_size, np.array(self.camera_matrix), np.array(self.distortion))
+
+
+class SensorDocument(CameraDocument):
+    """`sensor.yaml`: the camera and the light plane, in the camera frame, mm and px.
+
+    Covariances are optional; without them the sensor counts as exact. `camera_covariance` is 9x9
+    over fx, fy, cx, cy, k1, k2, p1, p2, k3; `light_plane_covariance` 4x4 over the plane normalised
+    to a unit normal.
+    """
+
+    light_plane: Vector4
+    camera_covariance: Covariance | None = None
+    light_plane_covariance: Covariance | None = None
+    serial: str | None = None
 
     @field_validator("light_plane")
     @classmethod
@@ -65,7 +75,7 @@ class SensorDocument(Document):
     def model(self) -> SensorModel:
         """The sensor as mathematics uses it."""
         return SensorModel(
-            CameraModel(self.image_size, np.array(self.camera_matrix), np.array(self.distortion)),
+            self.camera,
             Plane.from_coefficients(self.light_plane),
             _array_or_none(self.camera_covariance),
             _array_or_none(self.light_plane_covariance),

@@ -17,15 +17,15 @@ from importlib import resources
 from pathlib import Path
 
 import numpy as np
+from pydantic import ConfigDict
 
 from cell.archive.files import read_text
-from cell.core.documents.base import Document, Matrix3, Number
+from cell.core.documents.calibration import CameraDocument
 from cell.core.documents.strict_yaml import read_tree
 from cell.core.documents.table import Row, read_table
 from cell.core.documents.text import parse
 from cell.core.errors import DocumentError, UnmeasurableError
 from cell.core.geometry import Array
-from cell.core.optics import CameraModel
 from cell.metrology.board_pose import FEWEST_CORNERS, BoardView
 from cell.metrology.calibration_gates import GateBook
 from cell.metrology.diagnosis import as_given
@@ -39,17 +39,10 @@ FLAT = 1e-3     # mm
 COLUMNS = ("view", *(f"m{row}{column}" for row in range(4) for column in range(4)))
 
 
-class CameraDocument(Document):
-    """`camera.yaml` of a session."""
+class RecordedCamera(CameraDocument):
+    """`camera.yaml` of a session; what else stands in it was meant for somebody else."""
 
-    image_size: tuple[int, int]
-    camera_matrix: Matrix3
-    distortion: tuple[Number, Number, Number, Number, Number]
-
-    @property
-    def model(self) -> CameraModel:
-        """The camera as mathematics uses it."""
-        return CameraModel(self.image_size, np.array(self.camera_matrix), np.array(self.distortion))
+    model_config = ConfigDict(extra="ignore")
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,22 +79,26 @@ def _read(folder: Path, mount: Mount) -> tuple[HandEyeSession, tuple[str, ...]]:
     numbers, robot = _read_poses(folder / "base_from_flange.csv")
     if (folder / "views.npz").exists() or not (folder / "camera_from_board.csv").exists():
         return _read_views(folder, numbers, robot, mount)
-    _, boards = _read_poses(folder / "camera_from_board.csv")
+    names, boards = _read_poses(folder / "camera_from_board.csv")
     _same_length(folder, robot, boards)
-    return HandEyeSession.of_poses(robot, boards, mount).numbered(numbers), ()
+    notes = () if names == numbers else ("the two files name their views differently: row i of the "
+                                         "one was taken with row i of the other",)
+    return HandEyeSession.of_poses(robot, boards, mount).numbered(numbers), notes
 
 
 def _read_views(folder: Path, numbers: tuple[int, ...], robot: Array,
                 mount: Mount) -> tuple[HandEyeSession, tuple[str, ...]]:
     camera_file = folder / "camera.yaml"
-    camera = parse(CameraDocument, read_text(camera_file), str(camera_file)).model
+    camera = parse(RecordedCamera, read_text(camera_file), str(camera_file)).camera
     views = _read_corners(folder / "views.npz")
     _same_length(folder, robot, views)
-    keep = [index for index, view in enumerate(views) if len(view.pixels) >= FEWEST_CORNERS]
-    notes = tuple(f"view {numbers[index]} has {len(view.pixels)} corners: it was left out"
+    keep = [index for index, view in enumerate(views) if view.carries_pose]
+    notes = tuple(f"view {numbers[index]} has {len(view.pixels)} corners"
+                  f"{' on a line' if len(view.pixels) >= FEWEST_CORNERS else ''}: it was left out"
                   for index, view in enumerate(views) if index not in keep)
     if not keep:
-        raise DocumentError(f"no view has {FEWEST_CORNERS} corners", source=str(folder))
+        raise DocumentError(f"no view has {FEWEST_CORNERS} corners that are not on one line",
+                            source=str(folder))
     try:
         session = HandEyeSession.seen(robot[keep], tuple(views[index] for index in keep), camera,
                                       mount)
@@ -134,17 +131,23 @@ def _pose(row: Row) -> Array:
     return matrix
 
 
-def _read_corners(file: Path) -> list[BoardView]:
+def _read_arrays(file: Path) -> list[Array]:
     try:
-        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
-            points, pixels = (np.asarray(archive[name], dtype=np.float64)
-                              for name in ("object_mm", "image_px"))
+        with file.open("rb") as stream, np.lib.npyio.NpzFile(stream) as archive:
+            arrays = [archive[name] for name in ("object_mm", "image_px")]
     except FileNotFoundError:
         raise DocumentError("there is no such file", source=str(file)) from None
     except KeyError:
         raise DocumentError("expected arrays object_mm and image_px", source=str(file)) from None
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise DocumentError(f"not a readable .npz of numbers: {error}", source=str(file)) from None
+    if any(array.dtype.kind not in "fiu" for array in arrays):
+        raise DocumentError("object_mm and image_px: expected real numbers", source=str(file))
+    return [array.astype(np.float64) for array in arrays]
+
+
+def _read_corners(file: Path) -> list[BoardView]:
+    points, pixels = _read_arrays(file)
     if points.ndim != 3 or points.shape[2] != 3 or pixels.shape != (*points.shape[:2], 2):
         raise DocumentError("expected object_mm (view, corner, 3) and image_px (view, corner, 2); "
                             f"came {points.shape} and {pixels.shape}", source=str(file))
@@ -161,10 +164,8 @@ def _stated_mount(folder: Path) -> Mount | None:
         return None
     tree, _ = read_tree(read_text(file), str(file))
     stated = tree.get("camera_mount") if isinstance(tree, dict) else None
-    if stated in ("flange", "static"):
+    if stated in ("flange", "static") or stated is None:
         return stated
-    if stated is None:
-        return None
     raise DocumentError(f"camera_mount: expected flange or static; came {stated!r}",
                         source=str(file))
 
