@@ -100,8 +100,14 @@ def everything(cell: str = CELL, plan: Path | None = PLAN, yes: bool = YES, resu
                as_json: bool = JSON) -> None:
     """Calibrate camera, light plane and hand-eye from one session; makes a set.
 
-    You are asked to confirm robot, board and mounting, then to jog until the board fills the view.
-    The views are planned for the least uncertainty, every move checked, and driven after you agree.
+    Robot, TCP, payload, warm-up and the board's certificate are compared with the cell's file and
+    the active set on one screen; what differs needs a reason. Then jog until the board fills the
+    view. The views are planned for the least uncertainty, every move checked, and driven after you
+    agree; no more of them than the goal takes. Keys between two views: p pause, r retake the last,
+    s skip the next, q quit. `--live` shows it all: `cell view --live`, before or while it runs.
+
+    Where targets.yaml has boards in two places, the arm's own rows can be found as well.
+
     With `--plan FILE --yes` nobody is asked. A session that was cut off goes on with `--resume`.
 
     Exit code: 0 accepted, 1 refused (with reasons), 2 bad input, 3 device fault.

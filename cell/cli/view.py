@@ -16,8 +16,9 @@ def view(
     hole: str | None = typer.Option(None, metavar="ID", help="Open it at this hole."),
     web: bool = typer.Option(False, help="Serve it to a browser on this machine instead of opening "
                                          "a window."),
-    live: bool = typer.Option(False, help="Instead of a recording, show what `cell run --live` "
-                                          "measures on this machine."),
+    live: bool = typer.Option(False, help="Instead of a recording, show what `cell run --live`, "
+                                          "`cell shift --live` or `cell calibrate --live` does on "
+                                          "this machine."),
     picture: Path | None = typer.Option(None, metavar="PNG", help="Save a picture of it and end; "
                                                                   "needs no screen."),
 ) -> None:

@@ -100,6 +100,11 @@ class Checked:
     verdict: Ruling
     meaning: str
 
+    @property
+    def bound(self) -> str:
+        """Within what the figure passes, without that beyond which it is refused."""
+        return self.limit.partition(" (")[0]
+
     def __str__(self) -> str:
         return f"{self.meaning}: {self.value:.3g}, wanted {self.limit}"
 

@@ -1,4 +1,4 @@
-"""How far a session has come while it is captured: figures of the gates that views alone decide."""
+"""How far a session has come while it is captured: what of its gates can be told by then."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cell.core.errors import UnmeasurableError
 from cell.core.geometry import Array
 from cell.core.optics import CameraModel
 from cell.metrology.board_pose import BoardPose, BoardView
 from cell.metrology.calibration_gates import Checked, GateSet, check_gates
 from cell.metrology.camera_calibration import TILTED, coverage
 from cell.metrology.diversity import measure_diversity
-from cell.metrology.light_plane import StripeOnBoard
+from cell.metrology.light_plane import LightPlaneResult, StripeOnBoard, solve_light_plane
 from cell.metrology.motions import stack
 
 SPARE = 2    # views that a fit may leave out as outliers
@@ -31,7 +32,7 @@ class GatheredView:
 
 def check_progress(views: Sequence[GatheredView], camera: CameraModel, gates: GateSet,
                    steps: Sequence[str]) -> tuple[Checked, ...]:
-    """Hold the figures that are known without a solution against the gates of these steps.
+    """Hold the figures that are known by now against the gates of these steps.
 
     Args:
         views: two at least.
@@ -46,9 +47,13 @@ def check_progress(views: Sequence[GatheredView], camera: CameraModel, gates: Ga
                  for checked in check_gates(figures[step], getattr(gates, step)))
 
 
-def depth_percent(depths: tuple[float, float]) -> float:
-    """Say how much (%) of the depth of field lies between the nearest and the farthest (mm)."""
-    return min(100.0, 100.0 * (depths[1] - depths[0]) / DEPTH)
+def plane_figures(result: LightPlaneResult) -> dict[str, float]:
+    """What the gates of the light plane look at."""
+    near, far = result.depths
+    return {"poses": len(result.residuals),
+            "depth_percent": min(100.0, 100.0 * (far - near) / DEPTH),
+            "rms_mm": result.rms, "left_out_mm": result.left_out_rms,
+            "normal_sigma_deg": float(np.degrees(result.normal_sigma))}
 
 
 def _of_camera(views: Sequence[GatheredView], camera: CameraModel) -> dict[str, float]:
@@ -58,11 +63,15 @@ def _of_camera(views: Sequence[GatheredView], camera: CameraModel) -> dict[str, 
 
 
 def _of_plane(views: Sequence[GatheredView], camera: CameraModel) -> dict[str, float]:
-    depths = [StripeOnBoard(view.stripe, view.board.camera_from_board).meet(camera)[:, 2]
-              for view in views if view.stripe is not None]
-    ends = (float(min(map(np.min, depths))), float(max(map(np.max, depths)))) if depths \
-        else (0.0, 0.0)
-    return {"poses": len(depths), "depth_percent": depth_percent(ends)}
+    """Solve the plane with the camera as believed: that is cheap, and what it is worth by then
+    hangs on more than the number of poses.
+    """
+    stripes = [StripeOnBoard(view.stripe, view.board.camera_from_board)
+               for view in views if view.stripe is not None]
+    try:
+        return plane_figures(solve_light_plane(stripes, camera))
+    except UnmeasurableError:
+        return {"poses": len(stripes), "depth_percent": 0.0}
 
 
 def _of_hand_eye(views: Sequence[GatheredView]) -> dict[str, float]:

@@ -24,7 +24,7 @@ from cell.programs.calibration.solve import solve_session
 from cell.programs.calibration.wizard import Request, conclude, run_wizard
 
 ROOT = Path(__file__).parents[2]
-PLAN = CalibrationPlan(views=12, hold_out=3, sphere_views=6, reason="a trial")
+PLAN = CalibrationPlan(views=13, hold_out=3, sphere_views=6, reason="a trial")
 pytestmark = pytest.mark.timeout(400)
 
 
@@ -38,16 +38,12 @@ def plant(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def cut_off(plant):
-    """A session that broke off after eight of its views."""
-    class Quits(Scripted):
-        def tell(self, message):
-            super().tell(message)
-            if message.startswith("08/"):
-                raise KeyboardInterrupt
-
-    operator = Quits()
-    with pytest.raises(KeyboardInterrupt):
+    """A session in which all keys were pressed, the last after eight views."""
+    operator = Scripted(keys={"02/22": "p", "04/22": "r", "06/22": "s",
+                                                 "08/22": "q"})
+    with pytest.raises(DocumentError, match="--resume goes on"):
         run_wizard(Request("all", "demo", PLAN, plant, speed=20.0), operator)
+    assert operator.keys == {}
     return operator
 
 
@@ -78,17 +74,27 @@ def chain_error(folder, set_id):
 
 def test_every_view_is_on_the_disk_when_it_is_told(plant, cut_off):
     session = Session.read(next((plant / "demo" / "sessions").iterdir()))
-    ok = [view for view in session.views if view.number <= 8]
-    assert len(ok) == 8
+    status = {view.number: view.status for view in session.views}
+    assert status == dict.fromkeys(range(1, 9), "ok") | {7: "skipped by the operator"}
     assert cut_off.heard("squares measured by CMM")
-    assert cut_off.heard("corners ") and cut_off.heard("predicted uncertainty")
+    assert cut_off.heard("corners ") and cut_off.heard("| predicted 0.")
 
 
 def test_it_goes_on_where_it_was_cut_off(finished):
     done, operator = finished
-    assert operator.heard("8 views are there")
-    assert not operator.heard("01/21") and operator.heard("21/21")
-    assert len({view.number for view in Session.read(done.session).views}) == 21
+    assert operator.heard("7 views are there")
+    assert not operator.heard("01/22") and not operator.heard("07/22") and operator.heard("22/22")
+    assert len({view.number for view in Session.read(done.session).views}) == 22
+
+
+def test_keys_between_views_pause_retake_and_skip(plant, cut_off):
+    said = "\n".join(cut_off.said)
+    assert said.index("02/22") < said.index("the lights are off") < said.index("03/22")
+    session = Session.read(next((plant / "demo" / "sessions").iterdir()))
+    assert session.takes(4) == 2 and [session.takes(number) for number in (1, 2, 3, 5)] == [1] * 4
+    assert (session.folder / "images" / "0004_board.png").exists()
+    assert next(v for v in session.views if v.number == 4).ring == "images/0004-2_board.png"
+    assert "07/22 skipped: by the operator" in said
 
 
 def test_the_sphere_checks_the_way_through_the_laser(plant, finished):
@@ -159,7 +165,7 @@ def test_warnings_need_a_reason(plant, finished, tmp_path):
     header["plan"]["reason"] = ""
     keep = [line for line in (folder / "views.jsonl").read_text().splitlines()
             if line.endswith("}")]
-    (folder / "views.jsonl").write_text("\n".join(keep[:13]))
+    (folder / "views.jsonl").write_text("\n".join(keep[:14]))
     (folder / "session.json").write_text(json.dumps(header))
     operator = Scripted()
     belief = read_belief(plant, "demo")

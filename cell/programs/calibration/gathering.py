@@ -83,8 +83,8 @@ class Gathering:
             self.operator.tell(
                 f"The goal is reached with {len(self.progress.gathered)} views: predicted "
                 f"uncertainty {self.progress.predicted:.3f} mm (goal {plan.goal_mm:.3f}), and "
-                "every gate that the views decide is passed. The other views to be fitted to are "
-                "left out; those kept apart follow.")
+                "every gate is passed that can be told by now. The other views to be fitted to "
+                "are left out; those kept apart follow.")
         self.shown.spare(number)
         return True
 
@@ -184,17 +184,18 @@ class Gathering:
         where = f" at {board.id}" if target.place else ""
         stripe = "" if view.stripe is not None else ", no stripe"
         self.operator.tell(f"{self._counted(number)} ok {target.purpose:8} "
-                           f"{len(view.board.pixels)} corners{stripe}{where}{self._fallen(before)}")
+                           f"{len(view.board.pixels)} corners{stripe}{where}"
+                           f"{self._fallen(before) if number in self.progress else ''}")
 
     def _fallen(self, before: float) -> str:
         """Say how far the predicted uncertainty has come down, and what is missing yet."""
         missing = next((check for check in self.progress.checks if check.verdict != "pass"), None)
-        lacks = "" if missing is None else f" | {missing.meaning} {missing.value:.3g}, wanted " \
-                                           f"{missing.limit.partition(' (')[0]}"
+        lacks = "" if missing is None else \
+            f" | {missing.meaning}: {missing.value:.3g} ({missing.bound})"
         if not self.progress.has_goal:
             return lacks
-        return (f" | predicted uncertainty {_figure(before)} -> {_figure(self.progress.predicted)} "
-                f"mm (goal {self.session.header.plan.goal_mm:.3f}){lacks}")
+        return (f" | predicted {_figure(before)} -> {_figure(self.progress.predicted)} mm (goal "
+                f"{self.session.header.plan.goal_mm:.3f}){lacks}")
 
     def _say_how_far(self) -> None:
         goal = self.session.header.plan.goal_mm

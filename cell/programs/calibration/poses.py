@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,7 @@ from cell.programs.calibration.belief import Belief
 
 CANDIDATES = 140
 SPHERE_CANDIDATES = 60
+START_CANDIDATES, ROLL = 16, 90.0  # degrees, each way
 CORNER_SIGMA = 0.05  # px, of a board in focus
 
 
@@ -34,21 +35,30 @@ class PlannedViews:
 
 
 def plan_start(belief: Belief, design: BoardDesign, base_from_board: Transform) -> Joints:
-    """Find joints from which the camera looks straight at the board.
+    """Find joints from which the camera looks straight at the board, rolled only where it must be.
 
     Raises:
         DocumentError: not reachable, or the way from home is not free.
     """
-    camera = belief.sensor.camera
-    straight = draw_candidates(1, design, camera, belief.sensor.working_distance,
-                               Spread(0.1, 0.1, 0.1, 0.0))
-    home = belief.home
-    joints = _joints(belief, base_from_board, straight[0], home) if straight else None
-    problems = _problems(belief, home, joints) if joints else ("out of reach",)
-    if joints is None or problems:
-        raise DocumentError(f"the board cannot be looked at: {problems[0]}",
-                            source=str(belief.folder / "targets.yaml"))
-    return joints
+    home, problems = belief.home, ["out of reach"]
+    for joints in _starts(belief, design, base_from_board):
+        found = _problems(belief, home, joints)
+        if not found:
+            return joints
+        problems.append(found[0])
+    raise DocumentError(f"the board cannot be looked at: {problems[min(1, len(problems) - 1)]}",
+                        source=str(belief.folder / "targets.yaml"))
+
+
+def _starts(belief: Belief, design: BoardDesign, base_from_board: Transform) -> Iterator[Joints]:
+    """Straight views of a board, near home first, then near the middle of the joints' ranges."""
+    middle = tuple(np.radians(np.mean(belief.station.limits.joints_deg, axis=1)))
+    for roll, count in ((0.1, 1), (ROLL, START_CANDIDATES)):
+        for pose in draw_candidates(count, design, belief.sensor.camera,
+                                    belief.sensor.working_distance, Spread(0.1, roll, 0.1, 0.0)):
+            for seed in (belief.home, middle):
+                if (joints := _joints(belief, base_from_board, pose, seed)) is not None:
+                    yield joints
 
 
 def plan_poses(belief: Belief, plan: CalibrationPlan, design: BoardDesign,

@@ -136,7 +136,7 @@ def _gathered(progress: Progress) -> dict[str, Any]:
 
 
 def _as_line(check: Checked) -> Line:
-    return Line(check.meaning, f"{check.value:.3g}", check.limit.partition(" (")[0],
+    return Line(check.meaning, f"{check.value:.3g}", check.bound,
                 check.verdict == "pass")
 
 

@@ -13,7 +13,7 @@ from cell.core.geometry import Plane
 from cell.core.optics import CameraModel, SensorModel
 from cell.metrology.board_pose import locate_boards
 from cell.metrology.calibration_gates import Checked, GateSet, Ruling, check_gates, worst
-from cell.metrology.calibration_progress import depth_percent
+from cell.metrology.calibration_progress import plane_figures
 from cell.metrology.camera_calibration import TILTED, CameraResult, solve_camera
 from cell.metrology.hand_eye_calibration import HandEyeAnswer, calibrate_hand_eye
 from cell.metrology.hand_eye_session import HandEyeSession
@@ -197,13 +197,6 @@ def camera_figures(result: CameraResult) -> dict[str, float]:
             "tilted_views": int(np.sum(result.tilts > TILTED)),
             "covered_percent": 100.0 * result.covered,
             "split_half_percent": 100.0 * result.split_half}
-
-
-def plane_figures(result: LightPlaneResult) -> dict[str, float]:
-    """What the gates of the light plane look at."""
-    return {"poses": len(result.residuals), "depth_percent": depth_percent(result.depths),
-            "rms_mm": result.rms, "left_out_mm": result.left_out_rms,
-            "normal_sigma_deg": float(np.degrees(result.normal_sigma))}
 
 
 def board_shift(before: SeenView, again: SeenView, belief: Belief) -> float:

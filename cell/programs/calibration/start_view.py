@@ -55,11 +55,12 @@ class StartView:
 
     def _ask(self, look: StartLook) -> str:
         if look.seen is None:
-            return self._operator.choose("Look again, jog with a live line, or quit?",
+            return self._operator.choose(f"The board {self._board.id} is not seen. Look again, jog "
+                                         "with a live line, or quit?",
                                          (AGAIN, JOG, QUIT))
-        return self._operator.choose("Does the board fill the view, sharp and well lit? Take it, "
-                                     "look again, jog with a live line, or quit?",
-                                     (TAKE, AGAIN, JOG, QUIT))
+        return self._operator.choose(f"Does the board {self._board.id} fill the view, sharp and "
+                                     "well lit? Take it, look again, jog with a live line, or "
+                                     "quit?", (TAKE, AGAIN, JOG, QUIT))
 
     def _jog(self) -> StartLook:
         """Look again and again, until a key is pressed."""

@@ -120,7 +120,10 @@ def _accepted(solution: Solution, header: SessionHeader, operator: Operator) -> 
         return header.accepted
     reason = header.plan.reason or operator.ask("There are warnings. Why is this set acceptable? "
                                                 "(empty: it is not)", "")
-    return _merged(header.accepted, reason.strip()) if reason.strip() else None
+    if not reason.strip():
+        operator.tell("Not accepted: no set is made. The session is kept.")
+        return None
+    return _merged(header.accepted, reason.strip())
 
 
 def _merged(*reasons: str) -> str:

@@ -1,0 +1,104 @@
+"""The first screen: every line a verdict; what residuals cannot show needs a reason."""
+
+import json
+from dataclasses import replace
+from datetime import date
+from pathlib import Path
+
+import pytest
+from made_operator import Scripted
+
+from cell.core.errors import DocumentError
+from cell.core.ports import RobotIdentity
+from cell.programs.calibration.belief import read_belief
+from cell.programs.calibration.preconditions import (
+    accept_preconditions,
+    check_preconditions,
+    show_preconditions,
+)
+
+ROOT = Path(__file__).parents[2]
+DAY = date(2026, 11, 22)
+WARM = (33.0, 34.0, 33.5, 31.0, 31.0, 30.0)
+
+
+@pytest.fixture
+def belief():
+    return read_belief(ROOT / "calibration", "demo")
+
+
+@pytest.fixture
+def identity(belief):
+    robot = belief.hand_eye.robot
+    return RobotIdentity(robot.model, robot.serial, "5.14", robot.kinematics_checksum,
+                         robot.payload_kg, robot.tcp_offset)
+
+
+def check(belief, identity, what="all", temperatures=WARM, **board):
+    boards = [belief.targets.boards[0].model_copy(update=board)]
+    lines = check_preconditions(what, belief, boards, identity, temperatures, DAY)
+    return {line.item: line for line in lines}
+
+
+def test_all_is_met_by_the_demo_cell(belief, identity):
+    lines = check(belief, identity)
+    assert {line.verdict for line in lines.values()} == {"pass", "asked"}
+    assert lines["warm-up"].verdict == "asked"
+    operator = Scripted()
+    show_preconditions(tuple(lines.values()), operator)
+    assert operator.heard("30 to 34 C") and all(operator.heard(item) for item in lines)
+    assert accept_preconditions(tuple(lines.values()), "", operator) == ""
+
+
+@pytest.mark.parametrize(("change", "item"), [
+    ({"tcp_offset": (0.0, 0.0, 120.0, 0.0, 0.0, 0.0)}, "TCP offset"),
+    ({"payload_kg": 4.5}, "payload"),
+    ({"kinematics_checksum": "00-00"}, "kinematics"),
+])
+def test_a_difference_from_the_set_needs_a_typed_reason(belief, identity, change, item):
+    lines = check(belief, replace(identity, **change))
+    assert [one.item for one in lines.values() if one.verdict == "warn"] == [item]
+    operator = Scripted({"Why may it": "the new gripper"})
+    given = accept_preconditions(tuple(lines.values()), "", operator)
+    assert given == "the new gripper" and operator.heard(f"! {item}")
+    with pytest.raises(DocumentError, match=f"without a reason.*{item}"):
+        accept_preconditions(tuple(lines.values()), "", Scripted())
+    assert accept_preconditions(tuple(lines.values()), "in the plan", Scripted()) == "in the plan"
+
+
+def test_the_light_plane_alone_would_keep_the_hand_eye_of_another_robot(belief, identity):
+    lines = check(belief, replace(identity, payload_kg=4.5), what="light-plane")
+    assert lines["payload"].verdict == "refuse"
+    with pytest.raises(DocumentError, match="calibrate `hand-eye` or `all`"):
+        accept_preconditions(tuple(lines.values()), "never mind", Scripted())
+
+
+@pytest.mark.parametrize("change", [{"model": "ur5e"}, {"serial": "1"}])
+def test_another_robot_than_the_cell_names_is_refused(belief, identity, change):
+    lines = check(belief, replace(identity, **change))
+    assert "refuse" in [line.verdict for line in lines.values()]
+
+
+@pytest.mark.parametrize(("board", "verdict"), [
+    ({"certified_until": "2026-11-22"}, "pass"),
+    ({"certified_until": "2026-11-21"}, "warn"),
+    ({"certified_until": "next year"}, "warn"),
+    ({"certified_until": None}, "warn"),
+    ({"certificate": None}, "warn"),
+])
+def test_a_board_without_a_valid_certificate_needs_a_reason(belief, identity, board, verdict):
+    line = check(belief, identity, **board)["board table"]
+    assert line.verdict == verdict
+    assert verdict == "pass" or "caliper" in line.advice
+
+
+@pytest.mark.parametrize(("then", "verdict"), [(WARM, "pass"), ((36.0,) * 6, "warn"),
+                                               ((), "asked")])
+def test_a_cold_arm_is_seen_by_the_temperatures_of_the_last_set(belief, identity, tmp_path, then,
+                                                                verdict):
+    home = tmp_path / "sets" / belief.set_id
+    home.mkdir(parents=True)
+    view = {"of": "any version", "temperatures": then}
+    (home / "views.jsonl").write_text(json.dumps(view) + "\n")
+    lines = check(replace(belief, folder=tmp_path), identity)
+    assert lines["warm-up"].verdict == verdict
