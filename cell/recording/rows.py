@@ -15,36 +15,46 @@ from numpy.typing import NDArray
 from rerun.chunk import LazyChunkStream, RrdReader
 
 from cell.core.errors import DocumentError
-from cell.recording.forms import Plain, plain_of
+from cell.recording.forms import Plain, plains_of
 from cell.recording.framing import copy_whole, read_frame
 from cell.recording.layout import is_audited
 
 
 @dataclass(frozen=True)
 class Row:
-    """One row of one entity: its columns by name, and its place on the timelines."""
+    """One row of one entity: the `at`-th of those that were written together."""
 
     path: str
-    columns: dict[str, pa.Scalar]
+    batch: pa.RecordBatch
+    at: int
 
-    def number(self, name: str) -> int | None:
+    def number(self, timeline: str) -> int | None:
         """Return its place on a timeline, None where it has none."""
-        return self.columns[name].as_py() if name in self.columns else None
+        column = self._column(timeline)
+        return None if column is None else column[self.at].as_py()
 
     def first(self, name: str) -> Plain:
         """Return the first value of a component, as plain values; None where it is absent."""
-        values = self.columns[name].values if name in self.columns else None
-        return plain_of(values[0]) if values is not None and len(values) else None
+        values = self._values(name)
+        return plains_of(values[:1])[0] if values else None
 
     def blob(self, name: str) -> NDArray[np.uint8] | None:
         """Return a component's bytes as a uint8 array that lies where they were read."""
-        values = self.columns[name].values if name in self.columns else None
-        return values[0].values.to_numpy() if values is not None and len(values) else None
+        values = self._values(name)
+        return values[0].values.to_numpy() if values else None
 
     @property
     def name(self) -> str:
         """The last part of the entity's path."""
         return self.path.rpartition("/")[2]
+
+    def _column(self, name: str) -> pa.Array | None:
+        index = self.batch.schema.get_field_index(name)
+        return None if index < 0 else self.batch.column(index)
+
+    def _values(self, name: str) -> pa.Array | None:
+        column = self._column(name)
+        return None if column is None else column[self.at].values
 
 
 def read_rows(path: Path) -> Iterator[Row]:
@@ -58,7 +68,8 @@ def read_rows(path: Path) -> Iterator[Row]:
     with open_chunks(path) as chunks:
         for chunk in chunks:
             if is_audited(chunk.entity_path):
-                yield from _rows(chunk.entity_path, chunk.to_record_batch())
+                batch = chunk.to_record_batch()
+                yield from (Row(chunk.entity_path, batch, at) for at in range(batch.num_rows))
 
 
 @contextmanager
@@ -70,11 +81,6 @@ def open_chunks(path: Path) -> Iterator[LazyChunkStream]:
     """
     with _readable(path) as readable, damage_explained(path):
         yield _open(readable)
-
-
-def _rows(path: str, batch: pa.RecordBatch) -> Iterator[Row]:
-    for row in range(batch.num_rows):
-        yield Row(path, {name: batch.column(i)[row] for i, name in enumerate(batch.schema.names)})
 
 
 @contextmanager

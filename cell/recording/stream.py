@@ -17,8 +17,10 @@ from cell.recording.disk import Disk
 from cell.recording.memory import sweep_streams
 
 PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1,
-       cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_HUFFMAN_ONLY]
-"""Lossless: noise has no repetitions to look for, so that this is smaller and twice as fast."""
+       cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE]
+"""Lossless: noise has no repetitions to look for but runs of black and white, so that this is
+smaller and twice as fast. Reading it back is bound by inflating, whatever it was written with.
+"""
 if hasattr(cv2, "IMWRITE_PNG_FILTER"):  # OpenCV 4.11 and newer
     PNG += [cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_UP]
 

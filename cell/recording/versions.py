@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import hashlib
 import platform
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
@@ -20,6 +21,12 @@ PACKAGES = ("numpy", "scipy", "rerun-sdk", "pyarrow", "pydantic")
 
 def collect_versions() -> dict[str, str]:
     """Collect the versions that a start record holds, as texts by name."""
+    return dict(_collect_once())
+
+
+@cache
+def _collect_once() -> dict[str, str]:
+    """What runs does not change while it runs, and reading all sources takes a while."""
     return {
         "cell": __version__,
         "cell_code": _code_hash(),

@@ -81,13 +81,15 @@ def _parts(value: Anything) -> dict[str, Anything] | None:
 
     The outcome behind a feature is left out: it is compared with its hole.
     """
+    if isinstance(value, float | np.ndarray | str):
+        return None
+    if isinstance(value, dict):
+        return value
+    if isinstance(value, tuple | list) and not all(isinstance(each, float) for each in value):
+        return {getattr(each, "id", str(index)): each for index, each in enumerate(value)}
     if is_dataclass(value):
         return {field.name: getattr(value, field.name) for field in fields(value)
                 if not (isinstance(value, Feature) and field.name == "outcome")}
-    if isinstance(value, Mapping):
-        return dict(value)
-    if isinstance(value, tuple | list) and not all(isinstance(each, float) for each in value):
-        return {getattr(each, "id", str(index)): each for index, each in enumerate(value)}
     return None
 
 
