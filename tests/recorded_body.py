@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import yaml
 
 from cell.core.documents.papers import Papers
 from cell.core.documents.record import HoleRecord, Start, Stop
@@ -38,10 +39,32 @@ def record_body(path: Path, start: Start | None = None, holes: tuple[HoleRecord,
     recorder = Recorder(path, start)
     for hole in holes:
         recorder.write_hole(hole)
-    result = judge_run(Papers.parse(start.papers, start.set_id), start, holes)
-    recorder.finish(Stop(**{"status": "complete", "finished": start.started + 9.0,
-                            "holes": len(holes), "result": result} | changes))
+    papers = Papers.parse(start.papers, start.set_id)
+    whole = len(holes) == len(papers.planned_holes)
+    recorder.finish(Stop(**{"status": "complete" if whole else "interrupted",
+                            "finished": start.started + 9.0, "holes": len(holes),
+                            "result": judge_run(papers, start, holes)} | changes))
     return path
+
+
+def long_body(count: int) -> tuple[Start, tuple[HoleRecord, ...]]:
+    """The start and the holes of a body with `count` holes of two views, two of them over again."""
+    start, seen = measured_anew()
+    table = start.papers["nominals"].splitlines()
+    rows = {line.split(",")[0]: line.partition(",")[2] for line in table}
+    holes = tuple(_renamed(seen[2 * (k % 2)], k) for k in range(count))
+    names = [hole.observation.hole_id for hole in holes]
+    job = yaml.safe_load(start.papers["job"]) | {"stops": [{"hole": name} for name in names]}
+    nominals = [table[0], *(f"{name},{rows[name.partition('-')[0]]}" for name in names)]
+    papers = start.papers | {"job": yaml.safe_dump(job), "nominals": "\n".join(nominals)}
+    return replace(start, papers=papers), holes
+
+
+def _renamed(record: HoleRecord, index: int) -> HoleRecord:
+    name = f"{record.observation.hole_id}-{index}"
+    attempts = tuple(replace(attempt, outcome=replace(attempt.outcome, hole_id=name))
+                     for attempt in record.attempts)
+    return HoleRecord(index, replace(record.observation, hole_id=name), attempts)
 
 
 def abort(_path: Path) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
-from math import inf
-from typing import TYPE_CHECKING, Any
+from math import inf, isfinite
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rich.box import SIMPLE
 from rich.markup import escape
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from cell.programs.audit.compare import Difference
     from cell.programs.audit.folder import FolderAudit
     from cell.programs.audit.report import Change, LogAudit
+
+Json: TypeAlias = Any
 
 COLOURS = {"identical": "green", "reproduced": "green", "differs": "red", "refused": "red"}
 MARKS = {True: "[green]yes[/]", False: "[red]no [/]", None: "[yellow]–  [/]"}
@@ -72,8 +74,18 @@ def as_json(audits: Sequence[LogAudit], folders: Sequence[FolderAudit], code: in
 def _log_as_json(audit: LogAudit) -> dict[str, Any]:
     numbers = {level: audit.numbers[level] for level in ("identical", "reproduced", "differs")}
     changes = [{**asdict(change), "turns": change.turns} for change in audit.changes]
-    return asdict(audit) | {"log": str(audit.log), "answer": audit.answer, "numbers": numbers,
+    said = asdict(audit) | {"log": str(audit.log), "answer": audit.answer, "numbers": numbers,
                             "changes": changes}
+    return {name: _finite(value) for name, value in said.items()}
+
+
+def _finite(value: Json) -> Json:
+    """Say null where an altered recording holds no number: JSON knows neither NaN nor infinity."""
+    if isinstance(value, float):
+        return value if isfinite(value) else None
+    if isinstance(value, dict):
+        return {name: _finite(each) for name, each in value.items()}
+    return [_finite(each) for each in value] if isinstance(value, list | tuple) else value
 
 
 def _origin(audit: LogAudit) -> str:

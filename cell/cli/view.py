@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 
 import typer
+from rich.markup import escape
 
 from cell.cli.words import console
-from cell.core.errors import DocumentError
+from cell.core.errors import DocumentError, RecordingError
 
 
 def view(
@@ -28,25 +28,37 @@ def view(
     `--web` is served from this machine, but a browser with access to the internet lets it ask for
     news: open it in one without, or block them there.
 
-    A torn recording is shown up to its last whole hole. Ctrl-C ends it.
+    What is shown is drawn anew from the audited records. A torn recording is shown up to its last
+    whole hole; what is not as it was sealed is said. Ctrl-C ends it.
 
-    Exit code: 0 closed, 2 unreadable or no such hole, 3 no viewer or no screen.
+    Exit code: 0 closed, 2 unreadable or no such hole, 3 no viewer or no screen, 4 the picture
+    cannot be written.
     """
     from cell.recording.guard import guarded
-    from cell.recording.replay import find_hole, photograph, serve, show, wait_for_run
+    from cell.recording.replay import photograph, serve, show, survey, wait_for_run
 
     if live:
         return wait_for_run(_tell if web else None)
     if log is None:
         raise DocumentError("expected a recording, or --live", place="LOG")
-    number = guarded(partial(find_hole, hole_id=hole), log)
+    found = guarded(survey, log)
+    for warning in found.warnings:
+        console.print(f"[yellow]{escape(warning)}[/]", highlight=False, soft_wrap=True)
+    number = None if hole is None else found.find(hole)
     if picture is not None:
-        picture.write_bytes(photograph(log, number).png)
+        _save(photograph(log, number or 0).png, picture)
     elif web:
-        serve(log, _tell)
+        serve(log, number, _tell)
     else:
-        show(log, number)
+        show(log, number or 0)
     return None
+
+
+def _save(png: bytes, picture: Path) -> None:
+    try:
+        picture.write_bytes(png)
+    except OSError as error:
+        raise RecordingError(f"{picture}: cannot be written: {error.strerror}") from None
 
 
 def _tell(address: str) -> None:

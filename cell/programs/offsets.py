@@ -23,7 +23,7 @@ from cell.metrology.offsets_study import (
 )
 from cell.recording.integrity import check_chain, check_seal
 from cell.recording.pages import Page, read_pages, without_images
-from cell.recording.seal import Seal
+from cell.recording.seal import Closed, Seal
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,11 +101,11 @@ def _read(log: Path) -> Recorded:
     start, stop = pages[0].record, pages[-1].record
     records = [page.record for page in pages if isinstance(page.record, HoleRecord)]
     status = stop.status if isinstance(stop, Stop) else "died"
-    chain = check_chain(seal, pages[-1].chain, len(records),
-                        [fault for page in pages for fault in page.faults], status)
+    assert isinstance(start, Start)  # `read_pages` sees to it
+    chain = check_chain(seal, Closed(pages[-1].chain, len(records), status, start.recording_id),
+                        [fault for page in pages for fault in page.faults])
     if not chain.passed:
         raise DocumentError(f"not as it was recorded: {chain.words}", source=str(log))
-    assert isinstance(start, Start)  # `read_pages` sees to it
     if status != "complete":
         raise DocumentError(f"expected a complete run; this one was {status}", source=str(log))
     papers = Papers.parse(start.papers, start.set_id)

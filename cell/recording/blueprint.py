@@ -14,19 +14,31 @@ from cell.recording.body_scene import EXAGGERATION, PLOT, TABLE
 from cell.recording.hole_scene import LASER, RING, VERDICT
 
 
-def build_blueprint(papers: Papers, following: bool = False) -> rrb.Blueprint:
+def build_blueprint(papers: Papers, following: bool = False, at: int | None = None
+                    ) -> rrb.Blueprint:
     """Lay out the views for a body.
 
     Args:
         papers: those of the run: they say how large an image is, and from where to look.
-        following: stay with the newest hole (live); else wait at the first.
+        following: stay with the newest hole (live); else wait at the first, or
+        at: wait at this place of the time line.
     """
     return rrb.Blueprint(
         rrb.Horizontal(_seen(papers), _said(), column_shares=[3, 2]),
         rrb.BlueprintPanel(state="hidden"), rrb.SelectionPanel(state="hidden"),
-        rrb.TimePanel(state="collapsed", timeline=layout.HOLE_TIMELINE,
-                      play_state="following" if following else "paused"),
-        auto_layout=False, auto_views=False)
+        _time_panel(following, at), auto_layout=False, auto_views=False)
+
+
+def _time_panel(following: bool, at: int | None) -> rrb.TimePanel:
+    """A layout cannot say where the time line stands; that it plays one place over and over, it
+    can. A click on another place ends it.
+    """
+    if at is None:
+        return rrb.TimePanel(state="collapsed", timeline=layout.HOLE_TIMELINE,
+                             play_state="following" if following else "paused")
+    return rrb.TimePanel(state="collapsed", timeline=layout.HOLE_TIMELINE, play_state="playing",
+                         loop_mode="selection",
+                         time_selection=rrb.components.AbsoluteTimeRange(at, at))
 
 
 def _seen(papers: Papers) -> rrb.Vertical:
@@ -50,7 +62,7 @@ def _said() -> rrb.Vertical:
         rrb.Tabs(rrb.TextDocumentView(origin=VERDICT, name="this hole"),
                  rrb.TextDocumentView(origin=TABLE, name="the body")),
         rrb.TimeSeriesView(origin=PLOT, name="deviation as share of its tolerance, hole by hole",
-                           plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop)),
+                           plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop)),
         rrb.StateTimelineView(origin=VERDICT, name="verdicts"),
         row_shares=[5, 4, 1.4])
 

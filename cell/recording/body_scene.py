@@ -13,8 +13,8 @@ from cell.core.geometry import Array
 from cell.recording import colours
 from cell.recording.hole_scene import VERDICT, Drawing, markdown
 
-EXAGGERATION = 40.0
-"""How much longer than life a deviation is drawn: 1 mm shows as 40 mm."""
+EXAGGERATION = 200.0
+"""How much longer than life a deviation is drawn: 1 mm shows as 200 mm."""
 
 NOMINAL, MEASURED = "/body/nominal", "/body/measured"
 PLOT, LIMITS, TABLE = "/deviation", "/deviation/limits", "/result"
@@ -43,7 +43,7 @@ def draw_features(features: Sequence[Feature], holes: Sequence[Hole]) -> Iterato
     tinted = [colours.VERDICTS[feature.verdict] for feature in features]
     centres = np.array([by_id[feature.id].centre for feature in features]).reshape(-1, 3)
     yield (MEASURED,
-           rr.Points3D(centres, colors=tinted, radii=rr.Radius.ui_points(6.0), show_labels=False,
+           rr.Points3D(centres, colors=tinted, radii=rr.Radius.ui_points(5.0), show_labels=False,
                        labels=[_label(feature) for feature in features]),
            rr.Arrows3D(origins=centres, colors=tinted, radii=rr.Radius.ui_points(1.5),
                        vectors=EXAGGERATION * np.array([_shift(f) for f in features]

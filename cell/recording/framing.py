@@ -30,12 +30,23 @@ class Frame:
     closed: bool
 
 
+def check_file(path: Path) -> None:
+    """Refuse what is there but no file: a folder, or a pipe, at which reading would never end.
+
+    Raises:
+        DocumentError: it is something else than a file.
+    """
+    if path.exists() and not path.is_file():
+        raise DocumentError("is not a file", source=str(path))
+
+
 def read_frame(path: Path) -> Frame:
     """Walk the messages of a recording file.
 
     Raises:
         DocumentError: it cannot be read, or is no recording.
     """
+    check_file(path)
     try:
         with path.open("rb") as file:
             return _walk(file, os.fstat(file.fileno()).st_size)

@@ -25,15 +25,16 @@ CROSS = 12.0  # px
 NOTHING = np.zeros((0, 2))
 RING, LASER = layout.IMAGES
 VERDICT = "/verdict"
+NO_AXES = 0.0  # mm: they would look like deviations
 CAMERA_IMAGE_AT = 120.0  # mm in front of the camera: where the 3D view shows the image
 
 
 def draw_camera(calibration: Calibration) -> Iterator[Drawing]:
     """Draw what stays of the camera: its lens, without the distortion."""
     camera = calibration.sensor.model.camera
-    yield layout.CAMERA, rr.Pinhole(
-        image_from_camera=camera.matrix, resolution=camera.image_size,
-        camera_xyz=rr.ViewCoordinates.RDF, image_plane_distance=CAMERA_IMAGE_AT)
+    lens = rr.Pinhole(image_from_camera=camera.matrix, resolution=camera.image_size,
+                      camera_xyz=rr.ViewCoordinates.RDF, image_plane_distance=CAMERA_IMAGE_AT)
+    yield layout.CAMERA, lens, rr.TransformAxes3D(NO_AXES)
 
 
 def draw_hole(record: HoleRecord, calibration: Calibration) -> Iterator[Drawing]:
@@ -52,6 +53,13 @@ def markdown(text: str) -> rr.TextDocument:
     """Make a text for the viewer, which dies of a letter that its font does not have."""
     legible = text.encode("latin-1", errors="replace").decode("latin-1")
     return rr.TextDocument(legible, media_type="text/markdown")
+
+
+def order_of_views(record: HoleRecord) -> list[int]:
+    """Order the views so that those that count come last: the viewer shows the last."""
+    views, outcome = record.observation.views, record.outcome if record.attempts else None
+    counts = views[outcome.reference].attempt if isinstance(outcome, Measured) else -1
+    return sorted(range(len(views)), key=lambda index: views[index].attempt == counts)
 
 
 def _draw_stand(record: HoleRecord, calibration: Calibration) -> Iterator[Drawing]:

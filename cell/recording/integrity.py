@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,7 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
 from cell.core.errors import DocumentError
 from cell.recording.keys import is_signed_by, key_id, parse_public_key
-from cell.recording.seal import Seal, read_seal, reference, seal_path
+from cell.recording.seal import Closed, Seal, read_seal, reference, seal_path
 
 COPIES = ("repaired", "pruned")  # seals of copies name what was done to them
 
@@ -31,9 +32,12 @@ def check_seal(log: Path, trusted: Collection[str] = ()) -> tuple[Seal | None, l
         log: the recording.
         trusted: the ids of keys that are known here; with none, a signature shows no more than
             the id of its key.
+
+    Raises:
+        DocumentError: the recording cannot be read.
     """
     path = seal_path(log)
-    if not path.exists():
+    if not os.path.lexists(path):
         return None, [Check("seal", None, "unsealed: there is no seal beside it")]
     try:
         seal = read_seal(path)
@@ -42,35 +46,40 @@ def check_seal(log: Path, trusted: Collection[str] = ()) -> tuple[Seal | None, l
     return seal, [_check_file(log, seal), _check_signature(seal, trusted), _check_link(log, seal)]
 
 
-def check_chain(seal: Seal | None, head: str, holes: int, faults: Sequence[str],
-                status: str) -> Check:
+def check_chain(seal: Seal | None, found: Closed, faults: Sequence[str]) -> Check:
     """Check what was recomputed from the content against what was written and sealed.
 
     Args:
         seal: the recording's seal, if it has one.
-        head: the last link of the chain as recomputed.
-        holes: whole holes found.
+        found: the same of the recording itself: the last link of its chain, whole holes.
         faults: what is not as it was written.
-        status: how the run ended, by its stop record.
     """
     if faults:
         return Check("chain", False, "; ".join(faults))
     if seal is None:
-        return Check("chain", True, f"{holes} holes follow from the start record; nothing sealed "
-                                    "says that they are all")
-    if (seal.chain, seal.holes) != (head, holes):
+        return Check("chain", True, f"{found.holes} holes follow from the start record; nothing "
+                                    "sealed says that they are all")
+    if (seal.chain, seal.holes) != (found.chain, found.holes):
         return Check("chain", False, f"the seal closes {seal.holes} holes and another content")
-    if seal.status not in (status, *COPIES):
-        return Check("chain", False, f"the run ended {status}; the seal says {seal.status}")
-    return Check("chain", True, f"start, {holes} holes and end follow from each other")
+    if seal.recording_id != found.recording_id:
+        return Check("chain", False, f"this is the recording {found.recording_id}; the seal closes "
+                                     f"{seal.recording_id}")
+    if seal.status not in (found.status, *COPIES):
+        return Check("chain", False, f"the run ended {found.status}; the seal says {seal.status}")
+    if seal.status in COPIES and seal.original is None:
+        return Check("chain", False, f"the seal says {seal.status}, but not of which recording")
+    return Check("chain", True, f"start, {found.holes} holes and end follow from each other")
 
 
-def check_images(missing: int) -> Check:
+def check_images(seal: Seal | None, missing: int) -> Check:
     """Say whether the pixels were there to be compared with their hashes."""
-    if missing:
-        return Check("images", None, f"{missing} images were pruned: their hashes are in the chain,"
-                                     " the pixels cannot be measured again")
-    return Check("images", True, "the pixels of every image fit their hash")
+    if not missing:
+        return Check("images", True, "the pixels of every image fit their hash")
+    if seal is not None and seal.status != "pruned":
+        return Check("images", False, f"{missing} images are missing, and the seal does not say "
+                                      "that they were pruned")
+    return Check("images", None, f"{missing} images were pruned: their hashes are in the chain,"
+                                 " the pixels cannot be measured again")
 
 
 def _check_file(log: Path, seal: Seal) -> Check:
@@ -112,8 +121,8 @@ def _check_link(log: Path, seal: Seal) -> Check:
     if seal.previous is None:
         return Check("link", True, "the first seal of its folder")
     previous = log.with_name(seal.previous.file)
-    if not previous.exists():
+    if not os.path.lexists(previous):
         return Check("link", None, f"the seal before it, {previous.name}, is not here")
-    if reference(previous) != seal.previous:
+    if not previous.is_file() or reference(previous) != seal.previous:
         return Check("link", False, f"the seal before it, {previous.name}, is another one now")
     return Check("link", True, f"follows {previous.name}")

@@ -13,6 +13,7 @@ from cell.core.documents.record import HoleRecord, Start, Stop
 from cell.recording import layout
 from cell.recording.calibration_moment import CalibrationMoment
 from cell.recording.calibration_scene import CalibrationScene
+from cell.recording.hole_scene import order_of_views
 from cell.recording.live import Message, Paper
 from cell.recording.scene import Scene
 from cell.recording.viewer import hub_url
@@ -64,7 +65,7 @@ class Drawer:
 
 def _draw_previews(stream: rr.RecordingStream, at: int, record: HoleRecord) -> None:
     stream.set_time(layout.HOLE_TIMELINE, sequence=at)
-    for view in record.observation.views:
+    for view in (record.observation.views[index] for index in order_of_views(record)):
         image = rr.Image(view.image, color_model="L").compress(jpeg_quality=PREVIEW_QUALITY)
         stream.log(f"{layout.CAMERA}/{view.light}", image)
 

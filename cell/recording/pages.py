@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import groupby
@@ -22,6 +23,8 @@ from cell.recording.forms import form_of, pixel_hash
 from cell.recording.rows import Row, damage_explained, read_rows
 
 Record: TypeAlias = Start | HoleRecord | Stop
+
+YEAR_2100 = 4102444800.0  # s since 1970
 
 PRUNED = np.zeros((0, 0), np.uint8)
 """Stands for an image that is not there: its hash is still in the chain."""
@@ -109,30 +112,46 @@ def _read_start(plain: dict[str, Any], parts: Iterable[Row]) -> Page:
     if plain["schema"] > SCHEMA:
         raise DocumentError(f"is of format {plain['schema']}; this program reads formats up to "
                             f"{SCHEMA}: install a newer one")
-    texts = {row.name: row.first(layout.TEXT) for row in parts}
+    texts = [(row.name, row.first(layout.TEXT)) for row in parts]
     hashes = dict(plain["papers"])
-    faults = tuple(f"the paper {name} is altered" for name, text in texts.items()
+    faults = tuple(f"the paper {name} is altered" for name, text in texts
                    if text_hash(text) != hashes.get(name))
     start = form_of(Start).value(plain)
-    missing = len(hashes.keys() - texts.keys())
-    return Page(replace(start, papers={n: texts.get(n, "") for n in hashes}), "", faults, missing)
+    _check_moment(start.started)
+    missing = len(hashes.keys() - dict(texts).keys())
+    papers = {name: dict(texts).get(name, "") for name in hashes}
+    return Page(replace(start, papers=papers), "", faults, missing)
 
 
 def _read_hole(plain: dict[str, Any], parts: Iterable[Row]) -> Page:
-    images = {row.first(layout.PIXELS): _decode(row) for row in parts}
-    views = plain["observation"]["views"]
-    names = [view["image"] for view in views]
-    faults = tuple(f"an image of hole {plain['observation']['hole_id']} is altered"
-                   for name, image in images.items()
-                   if name not in names or pixel_hash(image) != name)
-    for view, name in zip(views, names, strict=True):
-        view["image"] = images.get(name, PRUNED)
-    missing = sum(name not in images for name in names)
-    return Page(complete_hole(form_of(HoleRecord).value(plain)), "", faults, missing)
+    """Every view has its image, under its own light, and there is no image beside them."""
+    views, hole_id = plain["observation"]["views"], plain["observation"]["hole_id"]
+    expected = Counter((f"{layout.CAMERA}/{view['light']}", view["image"]) for view in views)
+    found: Counter[tuple[str, str]] = Counter()
+    images, faults = {}, []
+    for row in parts:
+        name = row.first(layout.PIXELS)
+        images[name] = _decode(row)
+        found[row.path, name] += 1
+        if pixel_hash(images[name]) != name:
+            faults.append(f"an image of hole {hole_id} is altered")
+    faults += [f"an image of hole {hole_id} does not belong at {path}"
+               for path, _ in found - expected]
+    for view in views:
+        view["image"] = images.get(view["image"], PRUNED)
+    return Page(complete_hole(form_of(HoleRecord).value(plain)), "", tuple(faults),
+                (expected - found).total())
 
 
 def _read_stop(plain: dict[str, Any], parts: Iterable[Row]) -> Page:
-    return Page(form_of(Stop).value(plain), "", tuple(f"{row.path} is unexpected" for row in parts))
+    stop = form_of(Stop).value(plain)
+    _check_moment(stop.finished)
+    return Page(stop, "", tuple(f"{row.path} is unexpected" for row in parts))
+
+
+def _check_moment(seconds: float) -> None:
+    if not 0.0 <= seconds < YEAR_2100:
+        raise DocumentError(f"is damaged: {seconds} seconds since 1970 is no date of a run")
 
 
 def _decode(row: Row) -> Image:

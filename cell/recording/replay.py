@@ -1,22 +1,24 @@
-"""A recording in the viewer: sent over loopback, opened at a hole; a torn one to its last whole."""
+"""A recording in the viewer: drawn anew, opened at a hole; a torn one up to its last whole hole."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import rerun as rr
 from rerun.experimental import ViewerClient
 
-from cell.core.documents.papers import Papers
-from cell.core.documents.record import Start
+from cell.core.documents.record import HoleRecord, Start, Stop
 from cell.core.errors import DeviceError, DocumentError
 from cell.recording import layout
-from cell.recording.blueprint import build_blueprint
-from cell.recording.pages import read_pages
-from cell.recording.rows import open_chunks, read_rows
+from cell.recording.hole_scene import order_of_views
+from cell.recording.integrity import check_seal
+from cell.recording.pages import Page, read_pages
+from cell.recording.rows import damage_explained
+from cell.recording.scene import Scene
+from cell.recording.stream import encode
 from cell.recording.viewer import (
     LIVE_PORT,
     free_port,
@@ -38,44 +40,83 @@ class Photograph:
     complaints: tuple[str, ...]
 
 
-def find_hole(log: Path, hole_id: str | None) -> int:
-    """Find the place of a hole on the time line: the last, where it was visited twice; the first
-    place of all for None.
+@dataclass(frozen=True)
+class Survey:
+    """What a recording holds: its holes and their places on the time line (the last, where one was
+    visited twice), and sentences on what is not as it was closed.
+    """
+
+    log: Path
+    holes: Mapping[str, int]
+    warnings: tuple[str, ...]
+
+    def find(self, hole_id: str) -> int:
+        """Return the place of a hole.
+
+        Raises:
+            DocumentError: it is not in the recording.
+        """
+        if hole_id not in self.holes:
+            raise DocumentError(f"holds no hole {hole_id!r}; it holds "
+                                f"{', '.join(self.holes) or 'none'}", source=str(self.log))
+        return self.holes[hole_id]
+
+
+def survey(log: Path) -> Survey:
+    """Look through a recording before it is shown.
 
     Raises:
-        DocumentError: the recording is unreadable, or the hole is not in it.
+        DocumentError: it is unreadable.
     """
-    found = {row.first(layout.HOLE.record)["observation"]["hole_id"]:
-             row.number(layout.HOLE_TIMELINE)
-             for row in read_rows(log) if row.path == layout.HOLE.path}
-    if hole_id is None:
-        return 0
-    number = found.get(hole_id)
-    if number is None:
-        raise DocumentError(f"holds no hole {hole_id!r}; it holds {', '.join(found) or 'none'}",
-                            source=str(log))
-    return number
+    _, checks = check_seal(log)
+    warnings = [check.words for check in checks if check.passed is False or check.level == "seal"]
+    holes: dict[str, int] = {}
+    for number, page in enumerate(read_pages(log), start=-1):  # the start comes before hole 0
+        warnings += page.faults
+        if isinstance(page.record, HoleRecord):
+            holes[page.record.observation.hole_id] = number
+    return Survey(log, holes, tuple(warnings))
 
 
-def replay(log: Path, url: str) -> None:
-    """Send a recording and its layout to a viewer or hub.
+def replay(log: Path, url: str, open_at: int | None = None) -> None:
+    """Draw a recording anew into a viewer or hub.
+
+    What is shown follows from the audited records alone: the picture that the file brings along
+    for other viewers is not looked at.
+
+    Args:
+        log: the recording.
+        url: where the viewer or hub listens.
+        open_at: let it stand at this place of the time line, where nobody can tell the viewer.
 
     Raises:
         DocumentError: the recording is unreadable.
         DeviceError: nobody takes it.
     """
-    start = next(read_pages(log)).record
+    pages = read_pages(log)
+    start = next(pages).record
     assert isinstance(start, Start)  # `read_pages` sees to it
     stream = rr.RecordingStream(layout.APPLICATION, recording_id=start.recording_id)
     stream.connect_grpc(url)
-    stream.send_blueprint(build_blueprint(Papers.parse(start.papers, start.set_id)))
-    with open_chunks(log) as chunks:
-        stream.send_chunks(chunks)
+    with damage_explained(log):
+        _draw(stream, Scene(stream, start, open_at=open_at), pages)
     try:
         stream.flush(timeout_sec=PATIENCE_S)
     except (RuntimeError, ValueError) as error:
         raise DeviceError(f"does not take the recording: {error}", device="viewer") from error
     stream.disconnect()
+
+
+def _draw(stream: rr.RecordingStream, scene: Scene, pages: Iterator[Page]) -> None:
+    for number, page in enumerate(pages):
+        if isinstance(page.record, HoleRecord):
+            stream.set_time(layout.HOLE_TIMELINE, sequence=number)
+            for view in (page.record.observation.views[i] for i in order_of_views(page.record)):
+                if view.image.size:
+                    stream.log(f"{layout.CAMERA}/{view.light}", encode(view.image))
+            scene.add(number, page.record)
+        elif isinstance(page.record, Stop):
+            scene.finish(page.record)
 
 
 def show(log: Path, number: int) -> None:
@@ -94,8 +135,13 @@ def show(log: Path, number: int) -> None:
         process.wait()
 
 
-def serve(log: Path, tell: Callable[[str], None]) -> None:
+def serve(log: Path, open_at: int | None, tell: Callable[[str], None]) -> None:
     """Serve a recording to browsers of this machine until interrupted; `tell` gets the address.
+
+    Args:
+        log: the recording.
+        open_at: the place on the time line that it opens at, the first for None.
+        tell: gets the address.
 
     Raises:
         DocumentError: the recording is unreadable.
@@ -104,7 +150,7 @@ def serve(log: Path, tell: Callable[[str], None]) -> None:
     port, web_port = free_port(), free_port()
     with viewer_process("--serve-web", "--port", str(port),
                         "--web-viewer-port", str(web_port)) as process:
-        replay(log, hub_url(port))
+        replay(log, hub_url(port), open_at)
         tell(web_url(web_port, port))
         process.wait()
 

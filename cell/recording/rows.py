@@ -80,7 +80,7 @@ def open_chunks(path: Path) -> Iterator[LazyChunkStream]:
         DocumentError: it cannot be read, is no recording, or its content is damaged.
     """
     with _readable(path) as readable, damage_explained(path):
-        yield _open(readable)
+        yield _open(readable, path)
 
 
 @contextmanager
@@ -94,12 +94,14 @@ def _readable(path: Path) -> Iterator[Path]:
         yield Path(copy.name)
 
 
-def _open(path: Path) -> LazyChunkStream:
+def _open(readable: Path, path: Path) -> LazyChunkStream:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that there is no index: known, and said by the reader
-        reader = RrdReader(path)
-        (store,) = reader.recordings()
-        return reader.stream(store=store)
+        reader = RrdReader(readable)
+        stores = reader.recordings()
+        if len(stores) != 1:
+            raise DocumentError(f"holds {len(stores)} recordings; expected one", source=str(path))
+        return reader.stream(store=stores[0])
 
 
 @contextmanager

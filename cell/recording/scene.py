@@ -27,8 +27,9 @@ from cell.recording.pages import without_images
 class Scene:
     """Draws one run into a rerun stream. Everything drawn follows from the papers alone."""
 
-    def __init__(self, stream: rr.RecordingStream, start: Start, following: bool = False) -> None:
-        """Draw the plan, and lay out the views.
+    def __init__(self, stream: rr.RecordingStream, start: Start, following: bool = False,
+                 open_at: int | None = None) -> None:
+        """Draw the plan, and lay out the views: `following` the newest hole, or `open_at` one.
 
         Raises:
             DocumentError: the papers cannot be parsed.
@@ -39,7 +40,7 @@ class Scene:
         self._draw(draw_camera(self._papers.calibration), static=True)
         self._draw(draw_nominals(self._papers.planned_holes), static=True)
         self._draw_limits(0)
-        send_blueprint(stream, build_blueprint(self._papers, following))
+        send_blueprint(stream, build_blueprint(self._papers, following, open_at))
 
     def add(self, at: int, record: HoleRecord) -> None:
         """Draw the `at`-th hole. Where the alignment needs other holes first, its judgement comes

@@ -18,23 +18,33 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal, TypeAlias
 
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
-from pydantic import ValidationError
+from pydantic import AfterValidator, Field, ValidationError
 
 from cell.core.documents.base import Document
 from cell.core.errors import DocumentError, RecordingError
 from cell.recording.forms import canonical
+from cell.recording.framing import check_file
 from cell.recording.keys import key_id, public_text
 
 SUFFIX = ".seal.json"
 
 
+def _in_this_folder(name: str) -> str:
+    if name in ("", ".", "..") or "/" in name or "\0" in name:
+        raise ValueError("expected the name of a file in the same folder")
+    return name
+
+
+FileName: TypeAlias = Annotated[str, AfterValidator(_in_this_folder)]
+
+
 class Reference(Document):
     """Another file by its name and the sha256 of its bytes."""
 
-    file: str
+    file: FileName
     sha256: str
 
 
@@ -43,17 +53,17 @@ class Seal(Document):
     pruned copy was made from; without a key the seal is made of hashes only.
     """
 
-    format: int = 1
-    file: str
+    format: Literal[1] = 1
+    file: FileName
     size: int
     sha256: str
     chain: str
-    holes: int
+    holes: Annotated[int, Field(ge=0)]
     status: Literal["complete", "aborted", "interrupted", "fault", "repaired", "pruned"]
     recording_id: str
     sealed: str
     versions: dict[str, str]
-    sequence: int
+    sequence: Annotated[int, Field(ge=1)]
     previous: Reference | None = None
     original: Reference | None = None
     key: str | None = None
@@ -106,24 +116,35 @@ def read_seal(path: Path) -> Seal:
     Raises:
         DocumentError: it cannot be read, or is no seal.
     """
+    check_file(path)
     try:
         return Seal.model_validate_json(path.read_bytes())
     except OSError as error:
         raise DocumentError(f"cannot be read: {error.strerror}", source=str(path)) from None
     except ValidationError as error:
-        raise DocumentError(f"is not a seal: {error.errors()[0]['msg']}",
-                            source=str(path)) from None
+        first = error.errors()[0]
+        raise DocumentError(f"is not a seal: {first['msg']}", source=str(path),
+                            place=".".join(map(str, first["loc"]))) from None
 
 
 def reference(path: Path) -> Reference:
-    """Name a file with the hash of its bytes."""
-    with path.open("rb") as file:
-        return Reference(file=path.name, sha256=hashlib.file_digest(file, "sha256").hexdigest())
+    """Name a file with the hash of its bytes.
+
+    Raises:
+        DocumentError: it cannot be read.
+    """
+    check_file(path)
+    try:
+        with path.open("rb") as file:
+            return Reference(file=path.name, sha256=hashlib.file_digest(file, "sha256").hexdigest())
+    except OSError as error:
+        raise DocumentError(f"cannot be read: {error.strerror}", source=str(path)) from None
 
 
 def newest_seal(folder: Path) -> Path | None:
     """Find the seal with the highest number; one that cannot be read does not count."""
-    seals = [entry for entry in os.scandir(folder) if entry.name.endswith(SUFFIX)]
+    seals = [entry for entry in os.scandir(folder)
+             if entry.name.endswith(SUFFIX) and entry.is_file()]
     numbered = sorted((_number(entry.path, entry.stat().st_mtime_ns), entry.path)
                       for entry in seals)
     return next((Path(path) for _, path in reversed(numbered) if _is_seal(Path(path))), None)

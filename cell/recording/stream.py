@@ -25,6 +25,14 @@ if hasattr(cv2, "IMWRITE_PNG_FILTER"):  # OpenCV 4.11 and newer
     PNG += [cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_UP]
 
 
+def encode(image: Image) -> rr.EncodedImage:
+    """Encode an image without loss."""
+    done, png = cv2.imencode(".png", image, PNG)
+    if not done:
+        raise RecordingError("an image cannot be encoded")
+    return rr.EncodedImage(contents=png.tobytes(), media_type="image/png")
+
+
 class Stream:
     """One recording file. Strict: what rerun cannot take is an error, not a warning."""
 
@@ -57,11 +65,7 @@ class Stream:
 
     def write_image(self, path: str, image: Image, pixel_hash: str) -> None:
         """Write an image without loss, beside the hash of its pixels."""
-        done, png = cv2.imencode(".png", image, PNG)
-        if not done:
-            raise RecordingError(f"{self.path}: an image cannot be encoded")
-        self.rerun.log(path, rr.EncodedImage(contents=png.tobytes(), media_type="image/png"),
-                       rr.DynamicArchetype(layout.IMAGE_ARCHETYPE,
+        self.rerun.log(path, encode(image), rr.DynamicArchetype(layout.IMAGE_ARCHETYPE,
                                            components={"sha256": pixel_hash}))
 
     def flush(self) -> None:

@@ -13,12 +13,13 @@ from typing import Any, Protocol
 import pyarrow as pa
 
 from cell.core.documents.record import HoleRecord, Start, Stop
-from cell.core.documents.result import Measured, Outcome
+from cell.core.documents.result import Outcome
 from cell.core.errors import DocumentError
 from cell.recording import layout
 from cell.recording.chain import NOTHING, link, text_hash
 from cell.recording.echo import outcomes_of, say_hole_once, say_stop_once
 from cell.recording.forms import Plain, form_of
+from cell.recording.hole_scene import order_of_views
 from cell.recording.keys import key_path, read_key
 from cell.recording.picture import Picture
 from cell.recording.seal import Closed, write_seal
@@ -136,7 +137,7 @@ class Recorder:
         self._stream.at(layout.HOLE_TIMELINE, self._holes)
         plain = self._write_record(layout.HOLE, say_hole_once(record))
         hashes = [view["image"] for view in plain["observation"]["views"]]
-        for index in _shown_last(record):
+        for index in order_of_views(record):
             view = record.observation.views[index]
             self._stream.at(layout.VIEW_TIMELINE, self._views + index)
             self._stream.write_image(f"{layout.CAMERA}/{view.light}", view.image, hashes[index])
@@ -155,13 +156,6 @@ class Recorder:
         self._chain = link(self._chain, plain)
         self._stream.write_record(place, pa.array([plain], type=form.column), self._chain)
         return plain
-
-
-def _shown_last(record: HoleRecord) -> list[int]:
-    """Order the views so that those that count come last: the viewer shows the last."""
-    views, outcome = record.observation.views, record.outcome if record.attempts else None
-    counts = views[outcome.reference].attempt if isinstance(outcome, Measured) else -1
-    return sorted(range(len(views)), key=lambda index: views[index].attempt == counts)
 
 
 def _new_stream(path: Path, recording_id: str) -> Stream:

@@ -6,7 +6,7 @@ import time
 from dataclasses import replace
 
 import pytest
-from recorded_body import measured_anew, record_body
+from recorded_body import long_body, record_body
 
 from cell.programs.audit import log as audit_module
 from cell.programs.audit.log import audit_log
@@ -18,11 +18,9 @@ from cell.recording.guard import processes
 pytestmark = [pytest.mark.bench, pytest.mark.timeout(900)]
 
 
-@pytest.fixture(scope="module")
-def holes():
-    """Twenty-four holes of two views each: two of the golden recording, twelve times."""
-    _, seen = measured_anew()
-    return tuple(replace(seen[2 * (k % 2)], index=k) for k in range(24))
+def record_long(path, count=24):
+    start, holes = long_body(count)
+    return record_body(path, replace(start, recording_id=path.stem), holes)
 
 
 def timed(monkeypatch, module, name, spent):
@@ -39,8 +37,8 @@ def timed(monkeypatch, module, name, spent):
     monkeypatch.setattr(module, name, outer)
 
 
-def test_holes_a_second_and_where_the_time_goes(tmp_path, holes, monkeypatch, capsys):
-    log = record_body(tmp_path / "body.rrd", holes=holes)
+def test_holes_a_second_and_where_the_time_goes(tmp_path, monkeypatch, capsys):
+    log = record_long(tmp_path / "body.rrd")
     audit_log(log)
     began = time.process_time()
     plain = audit_log(log)
@@ -53,14 +51,14 @@ def test_holes_a_second_and_where_the_time_goes(tmp_path, holes, monkeypatch, ca
     audit_log(log)
     rest = time.process_time() - began - sum(spent.values())
     with capsys.disabled():
-        print(f"\naudit: {len(holes) / total:.1f} holes/s on one core ({plain.answer}); a hole "
-              "takes " + ", ".join(f"{name.strip('_')} {1e3 * seconds / len(holes):.1f} ms"
+        print(f"\naudit: {plain.holes / total:.1f} holes/s on one core ({plain.answer}); a hole "
+              "takes " + ", ".join(f"{name.strip('_')} {1e3 * seconds / plain.holes:.1f} ms"
                           for name, seconds in (spent | {"read and compare": rest}).items()))
     assert plain.answer == "identical"
 
 
-def test_two_workers_against_one(tmp_path, holes, capsys):
-    logs = [record_body(tmp_path / f"{name}.rrd", holes=holes) for name in "abcd"]
+def test_two_workers_against_one(tmp_path, capsys):
+    logs = [record_long(tmp_path / f"{name}.rrd") for name in "abcd"]
     seconds = {}
     for count in (1, 2):
         with processes(count) as executor:
@@ -82,9 +80,8 @@ print(audit.holes, audit.answer, resource.getrusage(resource.RUSAGE_SELF).ru_max
 """
 
 
-def test_memory_for_two_hundred_holes(tmp_path, holes, capsys):
-    many = tuple(replace(holes[k % 24], index=k) for k in range(200))
-    log = record_body(tmp_path / "long.rrd", holes=many)
+def test_memory_for_two_hundred_holes(tmp_path, capsys):
+    log = record_long(tmp_path / "long.rrd", 200)
     said = subprocess.run([sys.executable, "-c", PEAK, str(log)], capture_output=True, text=True,
                           check=True).stdout.split()
     with capsys.disabled():

@@ -2,11 +2,10 @@
 
 import statistics
 import time
-from dataclasses import replace
 
 import cv2
 import pytest
-from recorded_body import measured_anew, record_body
+from recorded_body import long_body, record_body
 
 from cell.recording import Recorder
 from cell.recording.stream import PNG
@@ -18,14 +17,13 @@ SHIFT_BODIES, YEAR_SHIFTS = 420, 3 * 230
 
 
 @pytest.fixture(scope="module")
-def holes():
-    _, seen = measured_anew()
-    return tuple(replace(seen[2 * (k % 2)], index=k) for k in range(24))
+def body():
+    return long_body(24)
 
 
-def test_what_it_costs_the_measuring_thread(tmp_path, holes, capsys):
+def test_what_it_costs_the_measuring_thread(tmp_path, body, capsys):
     """Measured as the cpu time of handing over, with the writer at work while the robot drives."""
-    start, _ = measured_anew()
+    start, holes = body
     recorder, costs, whole = Recorder(tmp_path / "a.rrd", start), [], []
     for hole in holes:
         began, cpu = time.perf_counter(), time.thread_time()
@@ -39,8 +37,9 @@ def test_what_it_costs_the_measuring_thread(tmp_path, holes, capsys):
               f"stop of {STOP_S} s), on the disk after {1e3 * statistics.median(whole):.0f} ms")
 
 
-def test_bytes_a_hole_and_a_forecast(tmp_path, holes, capsys):
-    log = record_body(tmp_path / "a.rrd", holes=holes)
+def test_bytes_a_hole_and_a_forecast(tmp_path, body, capsys):
+    start, holes = body
+    log = record_body(tmp_path / "a.rrd", start, holes)
     size = log.stat().st_size + log.with_name(log.name + ".seal.json").stat().st_size
     pngs = sum(len(cv2.imencode(".png", view.image, PNG)[1])
                for hole in holes for view in hole.observation.views)

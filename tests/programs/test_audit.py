@@ -53,7 +53,8 @@ def test_a_fresh_recording_comes_out_bit_for_bit(log):
     assert audit.numbers["identical"] > 5000
     assert audit.verdict == audit.verdict_then == "out_of_tolerance"
     assert {check.level: check.passed for check in audit.checks} == {
-        "file": True, "signature": None, "link": True, "chain": True, "images": True}
+        "file": True, "signature": None, "link": True, "chain": True, "images": True,
+        "records": True}
 
 
 def test_a_refused_first_try_is_replayed_as_it_happened(log):
@@ -131,6 +132,42 @@ def test_an_altered_recording_is_refused_and_the_chain_finds_it_even_unsealed(fo
     told = audit_log(log, UNSEALED)
     assert told.exit_code() == 2
     assert "does not follow" in told.problem
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    (lambda hole: {"index": 9}, "says that it is number 9, and is number 0"),
+    (lambda hole: {"attempts": (replace(hole.attempts[0], views=9),)}, "after [9] of 2 views"),
+    (lambda hole: {"attempts": (replace(hole.attempts[0], views=0),)}, "after [0] of 2 views"),
+    (lambda hole: {"observation": replace(hole.observation, hole_id="XX")},
+     "not in the job's plan"),
+])
+def test_a_record_that_cannot_be_is_named(folder, change, said):
+    """Whoever holds the key can seal anything: what is sealed must make sense as well."""
+    first, *others = measured_anew()[1]
+    log = record_body(folder / f"{abs(hash(said))}.rrd", holes=(replace(first, **change(first)),
+                                                                *others))
+    audit = audit_log(log)
+    assert audit.exit_code() == 2
+    assert said in audit.problem
+
+
+def test_an_end_that_does_not_fit_the_holes_is_named(folder):
+    holes = measured_anew()[1]
+    short = record_body(folder / "short.rrd", holes=holes[:2], status="complete")
+    assert "the run was complete, and lacks QP2" in audit_log(short).problem
+    again = replace(holes[0], index=3)
+    twice = record_body(folder / "twice.rrd", holes=(*holes, again))
+    assert "hole BP2: is recorded 2 times" in audit_log(twice).problem
+
+
+def test_content_that_no_function_can_measure_is_one_sentence(log, monkeypatch):
+    def stumble(*_):
+        raise KeyError("nowhere")
+
+    monkeypatch.setattr("cell.programs.audit.log.measure_hole", stumble)
+    audit = audit_log(log)
+    assert (audit.exit_code(), audit.problem) == (2, "cannot be measured again: "
+                                                     "KeyError('nowhere')")
 
 
 def test_a_pruned_recording_keeps_its_chain_and_says_what_it_lost(folder):

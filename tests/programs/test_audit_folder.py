@@ -76,6 +76,12 @@ def test_a_copy_is_a_duplicate(folder):
     assert ("duplicated", "e.rrd.seal.json") in kinds(folder)
 
 
+def test_two_recordings_of_one_id_are_duplicates(folder):
+    start = replace(measured_anew()[0], recording_id="a", body_id="another")
+    record_body(folder / "e.rrd", start=start, holes=measured_anew()[1][:1])
+    assert kinds(folder) == {("duplicated", "e.rrd.seal.json")}
+
+
 def test_a_stranger_is_named(folder, tmp_path):
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()

@@ -15,7 +15,7 @@ from recorded_body import measured_anew, record_body
 from cell.core.errors import DeviceError, DocumentError
 from cell.recording import Recorder, read
 from cell.recording.live import LiveView
-from cell.recording.replay import find_hole, photograph
+from cell.recording.replay import photograph, survey
 from cell.recording.rows import open_chunks
 from cell.recording.viewer import free_port, viewer_process
 
@@ -55,9 +55,10 @@ def test_the_numbers_beside_it_are_those_of_the_judgement(log):
 
 
 def test_a_hole_is_found_by_its_name(log):
-    assert [find_hole(log, name) for name in (None, "BP2", "SI3", "QP2")] == [0, 0, 1, 2]
+    found = survey(log)
+    assert [found.find(name) for name in ("BP2", "SI3", "QP2")] == [0, 1, 2]
     with pytest.raises(DocumentError, match="holds no hole 'XX'; it holds BP2, SI3, QP2"):
-        find_hole(log, "XX")
+        found.find("XX")
 
 
 def test_the_viewer_shows_it_without_complaints(log):

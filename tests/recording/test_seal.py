@@ -2,6 +2,7 @@
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -46,9 +47,13 @@ def test_a_fresh_recording_passes_every_level(tmp_path, papers, key):
     assert verdicts(second, [key]) == {"file": True, "signature": True, "link": True}
     assert read_seal(seal_path(second)).previous.file == "a.rrd.seal.json"
     seal, back = read_seal(seal_path(second)), read(second)
-    assert check_chain(seal, back.head, len(back.holes), back.faults, back.status).passed
-    assert not check_chain(seal, back.head, len(back.holes), back.faults, "fault").passed
-    assert check_images(back.missing).passed
+    found = Closed(back.head, len(back.holes), back.status, back.start.recording_id)
+    assert check_chain(seal, found, back.faults).passed
+    for other in ({"status": "fault"}, {"holes": 1}, {"chain": "00"}, {"recording_id": "other"}):
+        assert not check_chain(seal, replace(found, **other), back.faults).passed
+    assert check_images(seal, back.missing).passed
+    assert check_images(seal, 1).passed is False
+    assert check_images(seal.model_copy(update={"status": "pruned"}), 1).passed is None
 
 
 def test_without_a_key_the_seal_says_that_it_is_hashes_only(tmp_path, papers):

@@ -114,7 +114,11 @@ def _compare_numbers(where: str, recorded: Array, recomputed: Array, limit: Anyt
     level: Level = "reproduced" if (gap <= limits).all() else "differs"
     return Comparison(recorded.size, Difference(
         where, level, _words(recorded[worst]), _words(recomputed[worst]),
-        float(gap[worst]) if np.isfinite(gap[worst]) else None, float(limits[worst])))
+        _finite(gap[worst]), _finite(limits[worst])))
+
+
+def _finite(value: np.floating) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def _is_number(value: Anything) -> bool:

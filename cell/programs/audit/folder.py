@@ -65,18 +65,16 @@ def _unreadable(folder: Path, seals: Mapping[Path, Seal]) -> Iterator[Finding]:
 
 
 def _doubled(seals: Mapping[Path, Seal]) -> Iterator[Finding]:
-    """Two seals of one number, or one content under two names."""
-    numbers, contents = defaultdict(list), defaultdict(list)
+    """Two seals of one number, or one recording under two names."""
+    alike: defaultdict[tuple[str, object], list[str]] = defaultdict(list)
     for path, seal in seals.items():
-        numbers[seal.sequence].append(path.name)
+        alike["number", seal.sequence].append(path.name)
         if seal.original is None:
-            contents[seal.chain].append(path.name)
-    for number, names in sorted(numbers.items()):
-        if len(names) > 1:
-            yield Finding("duplicated", names[1], f"has the number {number}, and so has {names[0]}")
-    for names in contents.values():
-        if len(names) > 1:
-            yield Finding("duplicated", names[1], f"has the content of {names[0]}")
+            alike["content", seal.chain].append(path.name)
+            alike["recording id", seal.recording_id].append(path.name)
+    for (what, _), names in alike.items():
+        yield from (Finding("duplicated", name, f"has the {what} of {names[0]}")
+                    for name in names[1:])
 
 
 def _gaps(row: list[Path], seals: Mapping[Path, Seal]) -> Iterator[Finding]:

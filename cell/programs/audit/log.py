@@ -3,26 +3,28 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
 
+from cell.core.documents.papers import Papers
 from cell.core.documents.record import Attempt, HoleRecord, Start, Stop
 from cell.core.documents.result import BodyResult, Outcome
-from cell.core.errors import DocumentError
+from cell.core.errors import CellError, DocumentError
 from cell.metrology.decide import judge_run
 from cell.metrology.measure import measure_hole
 from cell.programs.audit.compare import Comparison, Difference, compare
+from cell.programs.audit.consistency import contradictions
 from cell.programs.audit.question import Question
 from cell.programs.audit.report import Change, LogAudit
 from cell.recording.audit_picture import AuditPicture
 from cell.recording.forms import as_recorded
 from cell.recording.integrity import Check, check_chain, check_images, check_seal
 from cell.recording.pages import Page, read_pages, without_images
-from cell.recording.seal import Seal
+from cell.recording.seal import Closed, Seal
 from cell.recording.versions import collect_versions
 
 Watch: TypeAlias = Callable[[int], None]
@@ -43,10 +45,11 @@ def audit_log(log: Path, question: Question = PLAIN, watch: Watch = unwatched) -
         question: how to go about it, and what else to ask.
         watch: told how many holes are through.
     """
-    seal, checks = check_seal(log, question.trusted)
-    if problem := _refusal(checks, seal, question):
-        return LogAudit(log, problem, checks=tuple(checks))
+    checks: list[Check] = []
     try:
+        seal, checks = check_seal(log, question.trusted)
+        if problem := _refusal(checks, seal, question):
+            return LogAudit(log, problem, checks=tuple(checks))
         pages = read_pages(log)
         audit = _Audit(log, question, next(pages))
         for count, page in enumerate(pages):
@@ -55,6 +58,10 @@ def audit_log(log: Path, question: Question = PLAIN, watch: Watch = unwatched) -
         return audit.close(log, seal, checks)
     except DocumentError as error:
         return LogAudit(log, str(error), checks=tuple(checks))
+    except CellError:
+        raise
+    except Exception as error:  # noqa: BLE001  whatever it holds must not stop the others
+        return LogAudit(log, f"cannot be measured again: {error!r}", checks=tuple(checks))
 
 
 def _refusal(checks: list[Check], seal: Seal | None, question: Question) -> str | None:
@@ -65,6 +72,11 @@ def _refusal(checks: list[Check], seal: Seal | None, question: Question) -> str 
     return "; ".join(failed) if failed and not question.unsealed else None
 
 
+def _not_intact(checks: Sequence[Check]) -> str | None:
+    failed = [check.words for check in checks if check.passed is False]
+    return f"not intact: {'; '.join(failed)}" if failed else None
+
+
 class _Audit:
     """One recording on its way through: the papers first, then hole by hole."""
 
@@ -73,6 +85,9 @@ class _Audit:
         self._picture = AuditPicture(log, first.record) if question.save else None
         self._start, self._what_if = first.record, question.what_if.asks
         self._papers = question.papers(first.record)
+        self._plan = (Papers.parse(self._start.papers, self._start.set_id) if self._what_if
+                      else self._papers)
+        self._known = {hole.id for hole in self._papers.holes}
         self._page, self._faults, self._missing = first, list(first.faults), 0
         self._recorded: list[HoleRecord] = []
         self._then: list[HoleRecord] = []
@@ -104,15 +119,19 @@ class _Audit:
         if recorded is None and self._what_if:
             recorded = as_recorded(judge_run(self._papers, self._start, self._recorded))
         status = "died" if self._stop is None else self._stop.status
-        chain = check_chain(seal, self._page.chain, len(self._recorded), self._faults, status)
+        found = Closed(self._page.chain, len(self._recorded), status, self._start.recording_id)
+        checks = [*checks, check_chain(seal, found, self._faults),
+                  check_images(seal, self._missing), self._check_records()]
         return LogAudit(
-            log, None if chain.passed else f"not intact: {chain.words}", self._start.body_id,
-            self._start.started, status,
-            self._page.chain, len(self._recorded),
-            (*checks, chain, check_images(self._missing)), self._numbers,
+            log, _not_intact(checks[-3:]), self._start.body_id, self._start.started, status,
+            self._page.chain, len(self._recorded), tuple(checks), self._numbers,
             tuple(self._differences), _versions_that_differ(self._start), tuple(self._warnings),
             self._skipped, recorded.verdict if recorded is not None else None, then.verdict,
             _changes(recorded, then) if recorded is not None and self._what_if else ())
+
+    def _check_records(self) -> Check:
+        wrong = list(contradictions(self._plan, self._recorded, self._stop))
+        return Check("records", not wrong, "; ".join(wrong) or "plan, holes and end agree")
 
     def _measure(self, record: HoleRecord, pruned: bool) -> None:
         self._recorded.append(without_images(record))
@@ -131,12 +150,14 @@ class _Audit:
             self._picture.add(record, then[-1].outcome)
 
     def _outcome(self, record: HoleRecord, attempt: Attempt) -> Outcome:
-        """Measure a hole from the views of an attempt: the very function that ran live. A hole that
-        was left out was not measured then, and is not now.
+        """Measure a hole from the views of an attempt: the very function that ran live.
+
+        A hole that was left out was not measured then, and is not now; one that is in no plan is
+        named by `contradictions`, or is not asked for by another job.
         """
-        if not attempt.views:
-            return attempt.outcome
         papers, observation = self._papers, record.observation.first(attempt.views)
+        if not attempt.views or observation.hole_id not in self._known:
+            return attempt.outcome
         return measure_hole(observation, papers.hole(observation.hole_id), papers.calibration,
                             papers.job.method, np.radians(papers.job.normal_sigma_deg))
 
