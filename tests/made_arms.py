@@ -82,3 +82,53 @@ class ArmWorld:
             if joints is not None:
                 return joints
         return None
+
+
+FACE = [(u, v) for u in (-1.0, 0.0, 1.0) for v in (-1.0, 0.0, 1.0)]
+FACES = [*[(0.0, 0.0, 1.0, u, v, 1.0) for u, v in FACE],
+         *[(-1.0, 0.0, 0.0, -1.0, u, v) for u, v in FACE],
+         *[(0.0, 1.0, 0.0, u, 1.0, v) for u, v in FACE]]
+"""Outward normal and place on a box of half-width one: 27 holes on three of its faces."""
+BOX_MIDDLE, BOX_HALF = np.array([820.0, -100.0, 250.0]), np.array([250.0, 450.0, 175.0])
+DATUMS = [0, 2, 6, 9, 15, 20, 26]  # at the ends of the three faces
+
+
+class StudyWorld(ArmWorld):
+    """The study that the figures come from: ten views of each of five boards; 27 holes on three
+    faces of a body of 0.5 x 0.9 x 0.35 m, laid on by best fit over 7 and judged at the other 20.
+
+    It does not say where body and boards stand, which three faces, which datums: here a body
+    before the robot, its top, its near and its left face, datums at the ends; boards as in
+    `ArmWorld`; holes looked at from 250 mm within 15 degrees of the face's normal, any roll.
+    """
+
+    def __init__(self, seed, boards=5, each=10):
+        super().__init__(seed, boards=boards, each=each)
+        self._looks = [self._look(np.array(face)) for face in FACES]
+
+    def holes_missed_by(self, arm, flange_from_camera):
+        """How far (mm, rms) the twenty holes are missed by."""
+        found = np.array([arm.forward(joints) @ flange_from_camera @ in_camera
+                          for joints, in_camera, _ in self._looks])
+        holes = np.array([hole for *_, hole in self._looks])
+        gap = lay_onto(found[DATUMS], holes[DATUMS]) @ found - holes
+        judged = np.delete(gap, DATUMS, axis=0)
+        return float(np.sqrt(np.mean(np.sum(judged ** 2, axis=1))))
+
+    def point_error(self, flange_from_camera):
+        """How far (mm, rms) the working volume is carried wrongly."""
+        return self._world.point_error(flange_from_camera)
+
+    def _look(self, face):
+        normal, hole = face[:3], BOX_MIDDLE + face[3:] * BOX_HALF
+        onto = Rotation.align_vectors([-normal], [[0.0, 0.0, 1.0]])[0]
+        for _ in range(500):
+            lean = Rotation.from_euler("xyz", [*self._rng.uniform(-15, 15, 2),
+                                               self._rng.uniform(-180, 180)], degrees=True)
+            turn = (onto * lean).as_matrix()
+            stand = Transform.from_parts(turn, hole - turn @ [0.0, 0.0, 250.0])
+            joints = self.nominal.closest(stand @ self.mounted.inverse, RESTING)
+            if joints is not None:
+                noisy = np.array(joints) + self._rng.normal(0.0, JOINT_NOISE, 6)
+                return joints, (self.true.forward(noisy) @ self.mounted).inverse @ hole, hole
+        raise AssertionError(f"the hole at {hole} is out of reach")

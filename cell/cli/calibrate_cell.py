@@ -71,6 +71,7 @@ def check(cell: str = CELL, calibration: Path = FOLDER, yes: bool = YES, speed: 
         print_json(_as_json(done))
     else:
         answers.print(_in_words(done), highlight=False)
+        answers.print(_warmth(done), highlight=False)
     good = done.corrected or done.alarm in ("reference", "ok", "warn")
     raise typer.Exit(ACCEPTED if good and not done.refused else REFUSED)
 
@@ -84,7 +85,14 @@ def _as_json(done: CheckedCell) -> dict[str, Any]:
             "correctable": None if drift is None else drift.correctable,
             "corrected": done.corrected,
             "gates": [vars(gate) for gate in done.gates],
-            "joint_temperatures_c": list(done.temperatures)}
+            "joint_temperatures_c": list(done.temperatures),
+            "camera_temperature_c": done.camera_temperature}
+
+
+def _warmth(done: CheckedCell) -> str:
+    coldest, warmest, camera = min(done.temperatures), max(done.temperatures), done.camera_temperature
+    seen = "unknown" if camera is None else f"{camera:.0f} degrees C"
+    return f"joints {coldest:.0f} to {warmest:.0f} degrees C, camera {seen}"
 
 
 def _in_words(done: CheckedCell) -> str:

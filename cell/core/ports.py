@@ -117,6 +117,9 @@ class Camera(Protocol):
             DeviceError: lost, or the image has the wrong size.
         """
 
+    def temperature(self) -> float | None:
+        """Read how warm the camera is, degrees C; None where it does not tell."""
+
     def close(self) -> None:
         """Release the device, bounded in time. Idempotent, never raises."""
 

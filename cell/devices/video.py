@@ -82,6 +82,10 @@ class VideoCamera:
                               f"{self._size[0]} x {self._size[1]}", device=DEVICE)
         return arrival.image
 
+    def temperature(self) -> float | None:
+        """Say nothing: cameras behind OpenCV hardly ever tell."""
+        return None
+
     def close(self) -> None:
         """Leave the source, bounded in time. Idempotent, never raises."""
         if self._source is not None:

@@ -21,7 +21,10 @@ Level: TypeAlias = Literal["fine", "coarse"]
 
 
 class Gate(Document):
-    """The bounds of one figure: within the first it passes, beyond the second it is refused."""
+    """The bounds of one figure: within the first it passes, beyond the second it is refused.
+
+    Where `at_most` stands alone, nothing is refused: beyond it a person says why.
+    """
 
     at_most: Number | None = None
     refuse_above: Number | None = None
@@ -33,7 +36,8 @@ class Gate(Document):
     def _one_side(self) -> Gate:
         above = (self.at_most is not None, self.refuse_above is not None)
         below = (self.at_least is not None, self.refuse_below is not None)
-        if {above, below} != {(True, True), (False, False)}:
+        if {above, below} != {(True, True), (False, False)} and (above, below) != (
+                (True, False), (False, False)):
             raise ValueError("a gate has either at_most and refuse_above, or at_least and "
                              "refuse_below")
         return self
@@ -42,15 +46,18 @@ class Gate(Document):
     def limit(self) -> str:
         """The bounds as they are printed."""
         if self.at_most is not None:
-            return f"<= {self.at_most:g} (refused above {self.refuse_above:g})"
+            beyond = (f"refused above {self.refuse_above:g}" if self.refuse_above is not None
+                      else "beyond it, say why")
+            return f"<= {self.at_most:g} ({beyond})"
         return f">= {self.at_least:g} (refused below {self.refuse_below:g})"
 
     def rule(self, value: float) -> Ruling:
         """Judge a value; what is not a number is refused."""
         if math.isnan(value):
             return "refuse"
-        if self.at_most is not None and self.refuse_above is not None:
-            return _ruling(value <= self.at_most, value <= self.refuse_above)
+        if self.at_most is not None:
+            return _ruling(value <= self.at_most,
+                           self.refuse_above is None or value <= self.refuse_above)
         assert self.at_least is not None and self.refuse_below is not None
         return _ruling(value >= self.at_least, value >= self.refuse_below)
 
@@ -74,6 +81,7 @@ class GateSet(Document):
     camera: dict[str, Gate]
     light_plane: dict[str, Gate]
     hand_eye: dict[str, Gate]
+    last_set: dict[str, Gate]
     sphere: dict[str, Gate]
     body: dict[str, Gate]
     drift_mm: dict[Literal["warn", "act", "stop"], Number]

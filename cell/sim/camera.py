@@ -8,6 +8,7 @@ import time
 from collections import deque
 from contextlib import suppress
 from itertools import count
+from math import exp
 from multiprocessing.connection import Connection
 from pathlib import Path
 from socket import socketpair
@@ -27,6 +28,7 @@ START_SECONDS = 30.0
 ANSWER_SECONDS = 10.0
 END_SECONDS = 2.0
 FOREVER = 1_000_000_000
+COLD, WARMER, WARM_UP_SECONDS = 23.0, 14.0, 1200.0  # degrees C
 LATER = 1.5  # times the time-out: when a late image comes
 
 
@@ -49,6 +51,7 @@ class SimulatedCamera:
         self._link: Connection | None = None
         self._images: deque[Image] = deque()
         self._tokens = count()
+        self._opened = time.monotonic()
 
     # --- the port -------------------------------------------------------------------------------
 
@@ -61,7 +64,7 @@ class SimulatedCamera:
             self._process = subprocess.Popen(
                 [sys.executable, "-m", "cell.sim.camera_process", str(theirs.fileno())],
                 pass_fds=[theirs.fileno()], start_new_session=True)
-        self._link = Connection(ours.detach())
+        self._link, self._opened = Connection(ours.detach()), time.monotonic()
         try:
             self._tell(self._path, self._address, self._speed, self._delivery)
             self._answer("ready", START_SECONDS)
@@ -87,6 +90,11 @@ class SimulatedCamera:
             raise DeviceError(f"an image of {width} x {height} pixels came, not of "
                               f"{self._size[0]} x {self._size[1]}", device=DEVICE)
         return image
+
+    def temperature(self) -> float | None:
+        """Read how warm the camera is, degrees C: it warms up from when it was opened."""
+        on = (time.monotonic() - self._opened) * self._speed
+        return COLD + WARMER * (1.0 - exp(-on / WARM_UP_SECONDS))
 
     def close(self) -> None:
         """End the camera's process. Idempotent, never raises."""

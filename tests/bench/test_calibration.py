@@ -10,10 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_arms import StudyWorld
 from made_sessions import SMALL, WIDE, World, plain_reprojection, plan
 
 from cell.metrology.hand_eye import solve_hand_eye
 from cell.metrology.hand_eye_start import solve_park
+from cell.metrology.kinematic_calibration import solve_kinematics
 
 pytestmark = [pytest.mark.bench, pytest.mark.timeout(900)]
 SEEDS = 40
@@ -50,6 +52,23 @@ def test_point_error(camera, count, planned, limit):
         assert figures["ML"] <= limit
     if camera is WIDE and not planned:
         assert figures["reprojection"] >= 1.8 * figures["ML"]
+
+
+def test_the_arms_own_rows_take_holes_from_half_a_millimetre_to_its_repeatability():
+    """The study's figures: 0.52 mm rms with the published rows, 0.13 with those estimated."""
+    missed = {"published": [], "estimated": [], "repeatability": []}
+    for seed in range(16):
+        world = StudyWorld(seed)
+        mount = world.hand_eye()
+        result = solve_kinematics(world.views, world.nominal, mount)
+        missed["published"].append(world.holes_missed_by(world.nominal, mount))
+        missed["estimated"].append(world.holes_missed_by(result.arm, result.flange_from_camera))
+        missed["repeatability"].append(world.holes_missed_by(world.true, world.mounted))
+    figures = {name: rms(values) for name, values in missed.items()}
+    print("\nkinematics, asked 0.52 -> 0.13 mm: "
+          + ", ".join(f"{name} {value:.3f} mm" for name, value in figures.items()))
+    assert 0.4 <= figures["published"] <= 0.65
+    assert figures["estimated"] <= 0.13
 
 
 def test_fifty_views_in_a_second_of_one_core():

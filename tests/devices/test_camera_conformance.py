@@ -94,6 +94,11 @@ def test_nothing_exposed_before_the_lamp_changed_comes(stage):
         assert (middle > 60) == on, f"turn {turn}"
 
 
+def test_it_tells_how_warm_it_is_or_nothing(stage):
+    warmth = stage.camera.temperature()
+    assert warmth is None or 10.0 < warmth < 60.0
+
+
 def test_an_image_that_does_not_come_is_a_timeout_and_the_next_is_right(stage):
     stage.camera.open()
     stage.light(True)

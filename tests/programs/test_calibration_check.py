@@ -40,6 +40,7 @@ def test_the_first_check_is_the_reference_and_the_next_is_held_against_it(plant,
              in (plant / "demo" / "drift" / "log.jsonl").read_text().splitlines()]
     assert [line["alarm"] for line in lines] == ["reference", "ok"]
     assert all(len(line["joint_temperatures_c"]) == 6 for line in lines)
+    assert all(20.0 < line["camera_temperature_c"] < 40.0 for line in lines)
 
 
 def test_the_sphere_is_measured_through_the_laser(twice):

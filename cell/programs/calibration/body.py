@@ -31,6 +31,10 @@ from cell.programs.station import Station, open_station
 
 FEWEST_DATUMS = 3
 LEAST_SIGMA = 0.02  # mm: no hole is measured better
+COMMON = ("registration", "hand_eye", "intrinsics", "light_plane")
+"""Shares that all datums have alike, and every hole measured later with the same set too: they move
+the body as a whole and cancel, so they are no noise of a datum."""
+MODEST = 0.25       # chi2 below which the datums agree far better than the robot promises
 
 
 @dataclass(frozen=True)
@@ -109,12 +113,9 @@ def _measure(stops: list[PlannedStop], station: Station, prepared: Prepared,
 
 
 def _datum(hole: Hole, measured: Measured, prepared: Prepared) -> Datum:
-    """Take a measured hole as a datum: CMM against the robot's base.
-
-    What the old registration is worth does not count: the base does not know of it.
-    """
+    """Take a measured hole as a datum: CMM against the robot's base."""
     papers = prepared.papers
-    shares = [share for source, share in measured.budget.items() if source != "registration"]
+    shares = [share for source, share in measured.budget.items() if source not in COMMON]
     a, b, c = (max(LEAST_SIGMA, float(value))
                for value in np.sqrt(np.sum(np.square(shares), axis=0))[:3])
     return Datum(hole.id, _reference(hole), papers.calibration.base_from_body @ measured.centre,
@@ -140,6 +141,10 @@ def _conclude(request: BodyRequest, prepared: Prepared, datums: list[Datum],
     verdict = worst(gate.verdict for gate in gates)
     for gate in gates:
         operator.tell(f"  {gate.verdict:6} {gate.meaning}: {gate.value:.3g}, wanted {gate.limit}")
+    if registration.chi2 is not None and registration.chi2 < MODEST:
+        operator.tell(f"The datums agree {registration.chi2 ** -0.5:.0f} times better than their "
+                      "uncertainty says: the robot's share is a bound over all its reach, not over "
+                      "this body.")
     operator.tell(f"verdict: {verdict}")
     reason = request.reason or (operator.ask("There are warnings. Why is this registration "
                                              "acceptable? (empty: it is not)", "")
@@ -150,15 +155,15 @@ def _conclude(request: BodyRequest, prepared: Prepared, datums: list[Datum],
 
 
 def body_figures(registration: Registration, holes: tuple[Hole, ...]) -> dict[str, float]:
-    """What the gates of the registration look at."""
+    """What the gates of the registration look at; nothing can be left out of six constraints."""
     sigmas = registration.predict_sigma(np.array([hole.centre for hole in holes]))
     left_out = [miss for miss in registration.left_out.values() if miss is not None]
     worst_datum = max(float(np.linalg.norm(list(axes.values())))
                       for axes in registration.residuals.values())
-    return {"rms_mm": registration.rms, "worst_datum_mm": worst_datum,
-            "redundancy": registration.redundancy,
-            "hole_sigma_mm": float(np.sqrt(np.sum(sigmas ** 2, axis=1)).max()),
-            "left_out_mm": max(left_out, default=float("nan"))}
+    figures = {"rms_mm": registration.rms, "worst_datum_mm": worst_datum,
+               "redundancy": registration.redundancy,
+               "hole_sigma_mm": float(np.sqrt(np.sum(sigmas ** 2, axis=1)).max())}
+    return figures | ({"left_out_mm": max(left_out)} if left_out else {})
 
 
 def _write(registration: Registration, prepared: Prepared, datums: list[Datum]) -> Path:

@@ -49,6 +49,7 @@ class CheckedCell:
     drift: Drift | None
     places: dict[str, Array]
     temperatures: tuple[float, ...]
+    camera_temperature: float | None = None
     gates: tuple[Checked, ...] = ()
     corrected: bool = False
 
@@ -68,7 +69,7 @@ def check_cell(request: CheckRequest, operator: Operator) -> CheckedCell:
 
     The spheres go the way of every measurement, through the laser, and have gates of their own. The
     first check of a set becomes its reference. Every check is one line of `drift/log.jsonl`, with
-    the joints' temperatures.
+    the temperatures of the joints, and of the camera where it tells one.
 
     Raises:
         DocumentError: a paper is wrong, no board was seen, or the operator said no.
@@ -84,14 +85,14 @@ def check_cell(request: CheckRequest, operator: Operator) -> CheckedCell:
             places |= _place(board, belief, station, operator)
         checks = [_check_sphere(sphere, belief, station, operator, request.gates)
                   for sphere in belief.targets.spheres]
-        temperatures = station.robot.state().temperatures
+        temperatures = station.robot.state().temperatures, station.camera.temperature()
     places |= {f"{sphere.id} centre": check.result.centre
                for sphere, check in zip(belief.targets.spheres, checks, strict=True)
                if check.result is not None}
     past = read_past(belief.folder, belief.set_id)
     apply_corrections(belief.folder, past[0].get("corrections", {}) if past else {})
     drift = _judge(places, past, request.gates) if past else None
-    checked = CheckedCell(drift, places, temperatures,
+    checked = CheckedCell(drift, places, *temperatures,
                           tuple(gate for check in checks for gate in check.gates))
     _log(belief, checked)
     return replace(checked, corrected=request.correct and _correct(belief, checked, operator))
@@ -161,7 +162,8 @@ def _log(belief: Belief, checked: CheckedCell) -> None:
 
 def _measured(checked: CheckedCell) -> dict[str, Any]:
     return {"places": {name: place.tolist() for name, place in checked.places.items()},
-            "joint_temperatures_c": list(checked.temperatures)}
+            "joint_temperatures_c": list(checked.temperatures),
+            "camera_temperature_c": checked.camera_temperature}
 
 
 def _correct(belief: Belief, checked: CheckedCell, operator: Operator) -> bool:

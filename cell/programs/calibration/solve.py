@@ -28,7 +28,7 @@ from cell.programs.calibration.seen import SeenView, see_again
 from cell.programs.calibration.session import Session
 from cell.programs.calibration.sphere import check_sphere, see_sphere
 
-STEPS = ("camera", "light plane", "laser path", "sphere")  # hand-eye gives its own reasons
+STEPS = ("camera", "light plane", "laser path", "sphere", "last set")  # hand-eye says its own
 
 
 @dataclass(frozen=True, eq=False)

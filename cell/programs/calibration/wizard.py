@@ -15,6 +15,7 @@ from cell.core.ports import Operator
 from cell.programs.calibration.belief import Belief, read_belief
 from cell.programs.calibration.capture import drive
 from cell.programs.calibration.gathering import Gathering
+from cell.programs.calibration.last_set import with_last_set
 from cell.programs.calibration.make_set import Signature, make_set
 from cell.programs.calibration.opening import Opening
 from cell.programs.calibration.poses import free_path
@@ -78,7 +79,7 @@ def conclude(session: Session, belief: Belief, operator: Operator, shown: Shown)
     """Solve what was captured, say what came of it, and make and activate the set."""
     operator.tell("solving ...")
     shown.step("solving")
-    solution = solve_session(session, belief)
+    solution = with_last_set(solve_session(session, belief), belief, session.header.plan.gates)
     show(solution, operator)
     shown.concluded(solution.verdict, [gate for gates in solution.gates.values() for gate in gates],
                     solution.reasons)
