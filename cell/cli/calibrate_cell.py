@@ -90,7 +90,8 @@ def _as_json(done: CheckedCell) -> dict[str, Any]:
 
 
 def _warmth(done: CheckedCell) -> str:
-    coldest, warmest, camera = min(done.temperatures), max(done.temperatures), done.camera_temperature
+    coldest, warmest = min(done.temperatures), max(done.temperatures)
+    camera = done.camera_temperature
     seen = "unknown" if camera is None else f"{camera:.0f} degrees C"
     return f"joints {coldest:.0f} to {warmest:.0f} degrees C, camera {seen}"
 

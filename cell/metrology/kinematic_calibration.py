@@ -22,6 +22,7 @@ from cell.metrology.motions import adjoint, inverse, nudge, small, stack
 
 ROWS = 24  # a and d (mm), alpha and theta (rad) of six joints
 STEP = 1e-6
+REPEATABILITY = RobotNoise(0.05, 0.005)  # of an arm of the UR10e class
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ def solve_kinematics(views: Sequence[JointView], arm: Arm, flange_from_camera: T
         noise: of a reached pose once the residuals are known: repeatability alone.
     """
     prior = priors or Priors()
-    fit = _Fit(views, arm, flange_from_camera, prior.sigmas, noise or RobotNoise(0.03, 0.003))
+    fit = _Fit(views, arm, flange_from_camera, prior.sigmas, noise or REPEATABILITY)
     start = np.zeros(fit.unknowns)
     solved = least_squares(fit.residual, start, x_scale=fit.scale, loss="soft_l1", f_scale=3.0)
     jacobian = solved.jac
