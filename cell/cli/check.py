@@ -47,7 +47,8 @@ def check(
 def _print_schema() -> None:
     from cell.core.documents.job import JobDocument
 
-    print(json.dumps(JobDocument.model_json_schema(), indent=1))
+    answers.print(json.dumps(JobDocument.model_json_schema(), indent=1), soft_wrap=True,
+                  markup=False, highlight=False)
 
 
 def _check(job: Path, cell: str | None, logs: Path, as_json: bool) -> None:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import io
+import os
 import signal
 import sys
+import time
 import traceback
 from contextlib import suppress
 from typing import Any
@@ -41,6 +44,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
+CLOSING_SECONDS = 10.0  # after an interrupt, for stopping, the recording's end and the report
 WRONG_WORDS: Any = typer.BadParameter.__mro__[2]  # the base of usage errors, wherever click lives
 REASONS = {2: "bad_input", 3: "device_fault", 4: "recording_failed", BUG: "program_fault",
            INTERRUPTED: "interrupted"}
@@ -61,13 +65,38 @@ def _cell(version: bool = typer.Option(False, "--version", help="Print the versi
 
 def main() -> None:
     """Run one command and leave with its exit code."""
+    interrupt = _Interrupt()
     for number in (signal.SIGINT, signal.SIGTERM):  # a shell's background job ignores SIGINT
-        signal.signal(number, _interrupt)
+        signal.signal(number, interrupt)
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as under nohup
+        signal.signal(signal.SIGHUP, interrupt)
+    _open_streams()
     sys.exit(_run())
 
 
-def _interrupt(_number: int, _frame: object) -> None:
-    raise KeyboardInterrupt
+class _Interrupt:
+    """Turns signals into a KeyboardInterrupt: one, so that a second does not break off closing."""
+
+    def __init__(self) -> None:
+        self._next = 0.0
+
+    def __call__(self, _number: int, _frame: object) -> None:
+        if time.monotonic() >= self._next:
+            self._next = time.monotonic() + CLOSING_SECONDS
+            raise KeyboardInterrupt
+
+
+def _open_streams() -> None:
+    """Have all three streams open, so that no file is opened in the place of a closed one, and
+    writing what a narrow encoding lacks as `?`.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest free number: this one
+            setattr(sys, name, open(number, "w" if number else "r", closefd=False))  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 def _run() -> int:
@@ -84,8 +113,7 @@ def _run() -> int:
         wrong.show()
         return _fail(DocumentError.exit_code, wrong.format_message())
     except CellError as error:
-        console.print(f"[red]error:[/red] {escape(str(error))}", highlight=False, soft_wrap=True)
-        return _fail(error.exit_code, str(error))
+        return _fail(error.exit_code, _explain(error))
     except Exception as bug:  # noqa: BLE001  must never end with a code that reads as a verdict
         traceback.print_exc()
         console.print("This is a fault of the program, not of your input.", style="red")
@@ -93,9 +121,18 @@ def _run() -> int:
     return 0
 
 
+def _explain(error: CellError) -> str:
+    """Say what went wrong, and what is left of the work, to people; return the same."""
+    console.print(f"[red]error:[/red] {escape(str(error))}", highlight=False, soft_wrap=True)
+    notes: list[str] = getattr(error, "__notes__", [])
+    for note in notes:
+        console.print(escape(note), highlight=False, soft_wrap=True)
+    return "; ".join((str(error), *notes))
+
+
 def _fail(code: int, detail: str) -> int:
     """Give the caller of `--json` its one object, also now; return the exit code."""
     if "--json" in sys.argv:
-        with suppress(OSError):  # the caller may be gone
+        with suppress(CellError):  # nobody can be told
             print_json({"ok": False, "reason": REASONS[code], "detail": detail})
     return code

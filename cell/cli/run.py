@@ -25,8 +25,8 @@ def run(
     body: str | None = typer.Option(None, help="The body's number; a new one every run unless "
                                                "given."),
     logs: Path = typer.Option(Path("logs"), help="Where recording, seal and report go."),
-    speed: float = typer.Option(1.0, min=0.01, help="Run a simulated cell this many times faster "
-                                                    "than real time."),
+    speed: float = typer.Option(1.0, min=0.01, max=100.0, help="Run a simulated cell this many "
+                                                                "times faster than real time."),
     truth: Path | None = typer.Option(None, help="After the run, write what the simulator knows "
                                                  "to this file (simulated cells only)."),
     live: bool = typer.Option(False, "--live", help="Show the run in a viewer that listens on this "
@@ -113,12 +113,12 @@ def _feature_as_json(feature: Feature) -> dict[str, Any]:
 
 def _print_table(finished: Finished) -> None:
     table = Table(title=f"Body {finished.body_id}", title_justify="left", header_style="bold",
-                  caption="mm; U is the largest expanded uncertainty (k = 2)",
+                  caption="mm; U: the largest expanded uncertainty (k = 2); pos.: true position",
                   caption_justify="left")
-    for name in ("hole", "verdict"):
-        table.add_column(name, no_wrap=True)
-    for name in ("dx", "dy", "dz", "dd", "U", "position"):
-        table.add_column(name, justify="right")
+    table.add_column("hole", no_wrap=True)
+    table.add_column("verdict")
+    for name in ("dx", "dy", "dz", "dd", "U", "pos."):
+        table.add_column(name, justify="right", no_wrap=True)
     for feature in finished.result.features:
         table.add_row(feature.id, _words(feature), *_deviations(feature), _largest_u(feature),
                       _millimetres(feature.true_position))

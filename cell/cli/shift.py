@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -25,8 +24,8 @@ def shift(file: Path | None = typer.Argument(None, help="The shift's file, jobs/
           simulate: bool = typer.Option(False, "--simulate", help="A virtual line brings virtual "
                                         "bodies; simulated cells only."),
           bodies: int | None = typer.Option(None, "--bodies", min=1, help="End after so many."),
-          speed: float = typer.Option(1.0, "--speed", min=0.01, help="How much faster than real "
-                                      "time; simulated cells only."),
+          speed: float = typer.Option(1.0, "--speed", min=0.01, max=100.0, help="How much "
+                                      "faster than real time; simulated cells only."),
           logs: Path = typer.Option(Path("logs"), "--logs", help="Where recordings and results "
                                     "lie."),
           live: bool = typer.Option(False, "--live", help="Show every body in a viewer on this "
@@ -66,7 +65,6 @@ def _run(file: Path, logs: Path, **options: Any) -> tuple[dict[str, Any], int]: 
     from cell.programs.shift.report import write_shift_report
     from cell.programs.shift.run import ShiftRequest, run_shift
 
-    signal.signal(signal.SIGTERM, _interrupt)
     with Keys() as keys, _screen(keys) as show:
         done = run_shift(ShiftRequest(file, logs, typed=_typed(keys), **options), show, _tell)
     written = write_shift_report(logs, done.document, done.began, done.ended)
@@ -116,10 +114,6 @@ def _screen(keys: Keys) -> Iterator[Callable[[Board], None]]:
 
 def _tell(words: str) -> None:
     console.print(words, highlight=False, soft_wrap=True)
-
-
-def _interrupt(_number: int, _frame: object) -> None:
-    raise KeyboardInterrupt
 
 
 def _print_registers() -> None:

@@ -34,7 +34,7 @@ def test_what_nobody_caught_never_reads_as_a_verdict(cell, monkeypatch, thrown, 
     assert json.loads(out)["reason"] == reason
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_background_job_can_be_stopped(number):
     def ignore():
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # as a shell does to what it sends to the back
@@ -50,6 +50,37 @@ def test_a_background_job_can_be_stopped(number):
         process.wait()
         process.stdout.close()
     assert process.returncode == 0
+
+
+def test_a_second_interrupt_does_not_break_off_the_closing():
+    interrupt = door._Interrupt()
+    with pytest.raises(KeyboardInterrupt):
+        interrupt(signal.SIGINT, None)
+    interrupt(signal.SIGINT, None)
+    interrupt._next = 0.0  # as if the closing had taken too long
+    with pytest.raises(KeyboardInterrupt):
+        interrupt(signal.SIGTERM, None)
+
+
+@pytest.mark.parametrize(("redirection", "code"), [
+    ("| true", 0), (">&-", 0), ("--json >&-", 0), ("--json | true", 0), ("2>&- >&- <&-", 0),
+    ("> /dev/full", 4), ("--json > /dev/full", 4)])
+def test_an_answer_that_nobody_reads_is_no_fault(tmp_path, redirection, code):
+    (tmp_path / "a.csv").write_text("id,x,y,z\nA,1,2,3\n")
+    line = f"set -o pipefail; {sys.executable} -m cell compare a.csv a.csv {redirection}"
+    done = subprocess.run(["bash", "-c", line], cwd=tmp_path, capture_output=True, text=True,
+                          stdin=subprocess.DEVNULL, timeout=60, check=False)
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+    assert ("cannot be written to standard output" in done.stderr) == (code == 4)
+
+
+def test_a_narrow_encoding_and_terminal_cost_no_number(tmp_path):
+    (tmp_path / "a.csv").write_text("id,x,y,z\nA,1,2,3\n")
+    narrow = {**os.environ, "PYTHONIOENCODING": "ascii", "COLUMNS": "20", "TERM": "dumb"}
+    done = subprocess.run([sys.executable, "-m", "cell", "compare", "a.csv", "a.csv"],
+                          cwd=tmp_path, capture_output=True, timeout=60, check=True, env=narrow)
+    assert done.stdout.count(b"+0.0000") >= 3
 
 
 def test_the_reasons_cover_every_code():
