@@ -28,9 +28,12 @@ def read_text(path: Path) -> str:
 def read_bytes(path: Path, most: int) -> bytes:
     """Read a file of at most so many bytes; DocumentError where it is absent, unreadable, larger.
 
-    What has no end, such as a device, is not read to its end either.
+    A pipe is refused: whoever opens one waits for its other end, perhaps for ever. What has no
+    end, such as a device, is not read to its end either.
     """
     try:
+        if path.is_fifo():
+            raise DocumentError("expected a file; came a pipe", source=str(path))
         with path.open("rb") as file:
             content = file.read(most + 1)
     except FileNotFoundError:
@@ -40,6 +43,14 @@ def read_bytes(path: Path, most: int) -> bytes:
     if len(content) > most:
         raise DocumentError(f"expected at most {most // 10**6} MB", source=str(path))
     return content
+
+
+def write_picture(path: Path, content: bytes) -> None:
+    """Write a picture that was asked for; DocumentError where that is not possible."""
+    try:
+        path.write_bytes(content)
+    except OSError as error:
+        raise DocumentError(f"cannot be written: {error.strerror}", source=str(path)) from None
 
 
 def replace_text(path: Path, text: str) -> None:

@@ -42,3 +42,17 @@ def check_logs(folder: Path) -> None:
     except OSError as error:
         raise DocumentError(f"recordings cannot be written here: {error.strerror}",
                             source=str(folder)) from None
+
+
+def choose_log(log: Path) -> Path:
+    """Take a recording as it is; of a folder, its newest recording.
+
+    Raises:
+        DocumentError: the folder holds none.
+    """
+    if not log.is_dir():
+        return log
+    found = sorted(log.glob("*.rrd"), key=lambda one: one.stat().st_mtime)
+    if not found:
+        raise DocumentError("there is no recording (.rrd) in this folder", source=str(log))
+    return found[-1]

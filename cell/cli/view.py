@@ -12,7 +12,8 @@ from cell.core.errors import DocumentError, RecordingError
 
 
 def view(
-    log: Path | None = typer.Argument(None, metavar="LOG", help="A recording (.rrd)."),
+    log: Path | None = typer.Argument(None, metavar="LOG", help="A recording (.rrd), or a "
+                                                                    "folder: its newest."),
     hole: str | None = typer.Option(None, metavar="ID", help="Open it at this hole."),
     web: bool = typer.Option(False, help="Serve it to a browser on this machine instead of opening "
                                          "a window."),
@@ -34,6 +35,7 @@ def view(
     Exit code: 0 closed, 2 unreadable or no such hole, 3 no viewer or no screen, 4 the picture
     cannot be written.
     """
+    from cell.archive.logs import choose_log
     from cell.recording.guard import guarded
     from cell.recording.replay import photograph, serve, show, survey, wait_for_run
 
@@ -41,6 +43,7 @@ def view(
         return wait_for_run(_tell if web else None)
     if log is None:
         raise DocumentError("expected a recording, or --live", place="LOG")
+    log = choose_log(log)
     found = guarded(survey, log)
     for warning in found.warnings:
         console.print(f"[yellow]{escape(warning)}[/]", highlight=False, soft_wrap=True)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from cell.archive.logs import check_logs, new_log
+from cell.archive.logs import check_logs, choose_log, new_log
 from cell.core.errors import DocumentError
 
 
@@ -50,3 +50,16 @@ def test_a_disk_without_room_for_a_megabyte_is_refused(tmp_path):
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert list((tmp_path / "logs").iterdir()) == []
+
+
+def test_of_a_folder_the_newest_recording_is_meant(tmp_path):
+    for age, name in enumerate(("b.rrd", "a.rrd", "c.html")):
+        (tmp_path / name).touch()
+        os.utime(tmp_path / name, (age, age))
+    assert choose_log(tmp_path) == tmp_path / "a.rrd"
+    assert choose_log(tmp_path / "b.rrd") == tmp_path / "b.rrd"
+
+
+def test_a_folder_without_recordings_is_refused(tmp_path):
+    with pytest.raises(DocumentError, match="no recording"):
+        choose_log(tmp_path)
