@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 import secrets
 import time
-from collections.abc import Mapping
-from contextlib import nullcontext
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -21,6 +22,8 @@ from cell.programs.station import Station, open_station
 from cell.recording import Recorder, collect_versions
 from cell.recording.live import LiveView
 from cell.report.body import BodyRun, body_report
+
+BODY_ID = re.compile(r"[^\x00-\x1f\x7f-\x9f\u2028\u2029]{1,100}")
 
 
 @dataclass(frozen=True)
@@ -74,10 +77,12 @@ def run_job(request: Request, watch: Watch) -> Finished:
         prepared.check_devices(station)
         start = begin(prepared, station, body_id, log.stem, conditions=request.conditions)
         inspection = BodyInspection(station, prepared, start, Recorder(log, start, live), watch)
-        status = measure(inspection)
-        if request.truth is not None and station.world is not None:
-            _write_truth(request.truth, station, body_id)
+        with _told(log, inspection):
+            status = measure(inspection)
+        truth = station.world.truth() if station.world is not None else {}
     report = write_report(log, start, inspection)
+    if request.truth is not None:
+        _write_truth(request.truth, {"body": body_id, **truth})
     return Finished(body_id, status, inspection.result, log, report)
 
 
@@ -96,6 +101,19 @@ def begin(prepared: Prepared, station: Station, body_id: str, recording_id: str,
     return Start(recording_id, body_id, time.time(), prepared.papers.set_id, prepared.papers.texts,
                  collect_versions(), station.identity.as_text(), dict(conditions or {}),
                  trial=trial, simulated=station.document.simulated)
+
+
+@contextmanager
+def _told(log: Path, inspection: BodyInspection) -> Iterator[None]:
+    """Have a run that failed leave its report too, and its error say where they lie."""
+    try:
+        yield
+    except CellError as error:
+        error.add_note(f"recording {log}")
+        if inspection.stop is not None:
+            with suppress(CellError):  # the first error counts
+                error.add_note(f"report    {write_report(log, inspection.start, inspection)}")
+        raise
 
 
 def write_report(log: Path, start: Start, inspection: BodyInspection) -> Path:
@@ -131,13 +149,27 @@ def _check_options(request: Request, prepared: Prepared) -> None:
     if request.speed != 1.0 and not station.simulated:
         raise DocumentError("--speed is for simulated cells: a real robot runs in real time",
                             source=f"cell {station.name}")
-    if request.truth is not None and not request.truth.parent.is_dir():
-        raise DocumentError("the folder for the truth does not exist", source=str(request.truth))
+    if request.truth is not None:
+        _check_truth(request.truth)
+    if request.body_id is not None and not BODY_ID.fullmatch(request.body_id):
+        raise DocumentError("expected 1 to 100 printable characters for the body's number; came "
+                            f"{request.body_id!r}", place="--body")
 
 
-def _write_truth(path: Path, station: Station, body_id: str) -> None:
-    assert station.world is not None
+def _check_truth(path: Path) -> None:
+    """Refuse, before anything moves, a file that could not be written after the run."""
+    there = path.exists()
     try:
-        path.write_text(json.dumps({"body": body_id, **station.world.truth()}, indent=1))
+        path.open("a").close()
+    except OSError as error:
+        raise DocumentError(f"the truth cannot be written here: {error.strerror}",
+                            source=str(path)) from None
+    if not there:
+        path.unlink()
+
+
+def _write_truth(path: Path, truth: Mapping[str, object]) -> None:
+    try:
+        path.write_text(json.dumps(truth, indent=1))
     except OSError as error:
         raise RecordingError(f"the truth cannot be written to {path}: {error.strerror}") from error

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from cell.core.errors import DeviceError
+from cell.core.errors import DeviceError, DocumentError
 from cell.programs.inspection import BodyInspection, prepare
 from cell.programs.run import Request, begin, measure, run_job
 from cell.programs.station import open_station
@@ -129,12 +129,23 @@ def test_a_protective_stop_ends_the_run_with_the_arm_at_rest_and_the_laser_off(
             if done == 2:
                 controller.tell_referee("protective_stop")
 
-        with pytest.raises(DeviceError, match="protective"):
+        with pytest.raises(DeviceError, match="protective") as stopped:
             run_job(Request(Path("jobs/demo.yaml")), watch)
         truth = json.loads(controller.tell_referee("truth"))
     assert truth["outputs"] == 0
     assert max(map(abs, truth["joint_speeds"])) < 1e-3
     (log,) = (plant / "logs").glob("*.rrd")
     assert read(log).status == "fault"
+    assert log.name in stopped.value.__notes__[0]
+    assert "protective stop" in log.with_suffix(".html").read_text()
+
+
+@pytest.mark.parametrize("words", [{"truth": Path("jobs")}, {"truth": Path("none/truth.json")},
+                                   {"body_id": ""}, {"body_id": "two\nlines"}])
+def test_what_could_not_be_kept_is_refused_before_the_cell_is_opened(plant: Path,
+                                                                     words: dict) -> None:
+    with pytest.raises(DocumentError):
+        run_job(Request(Path("jobs/demo.yaml"), **words), pytest.fail)
+    assert not (plant / "logs").exists()
 
 
