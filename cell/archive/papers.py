@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,8 +62,7 @@ def read_papers(job: Path, cell: str | None = None,
 
 def _beside(job: Path, name: str) -> Path:
     """Find a file that a job names; it stays in the job's folder."""
-    folder = job.parent.resolve()
-    file = (folder / name).resolve()
+    folder, file = (Path(os.path.realpath(path)) for path in (job.parent, job.parent / name))
     if Path(name).is_absolute() or not file.is_relative_to(folder):
         raise DocumentError(f"expected a file in the job's own folder; came {name!r}, which leaves "
                             "it", source=str(job), place="nominals")

@@ -7,6 +7,7 @@ of that: a failed write is kept and told at the next `sync`, and the pipe is dra
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 import select
@@ -51,6 +52,8 @@ class Disk:
         if self._failure is not None:
             raise self._failure
         os.fsync(self._file)
+        if os.fstat(self._file).st_nlink == 0:
+            raise OSError(errno.ENOENT, "the file has been removed")
 
     def close(self) -> None:
         """Wait for the end of the pipe, then for the disk.

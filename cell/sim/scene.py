@@ -10,7 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from cell.core.documents.base import Document, Matrix3, Matrix4, Number, Vector2, Vector3, Vector4
 from cell.core.documents.text import parse
@@ -18,8 +18,16 @@ from cell.core.errors import DocumentError
 
 Positive = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)]
 Magnitude = Annotated[float, Field(ge=0, strict=True, allow_inf_nan=False)]
+Pixels = Annotated[int, Field(ge=16, le=20_000)]
+Seed = Annotated[int, Field(ge=0)]
 Finish = Literal["steel", "galvanised", "ecoat_grey", "ecoat_black", "primer",
                  "ceramic"]
+
+
+def _a_direction(vector: Vector3) -> Vector3:
+    if not any(vector):
+        raise ValueError("expected a direction, of any length but zero")
+    return vector
 
 
 class SensorScene(Document):
@@ -30,7 +38,7 @@ class SensorScene(Document):
     on a white sheet at the working distance.
     """
 
-    image_size: tuple[int, int]
+    image_size: tuple[Pixels, Pixels]
     camera_matrix: Matrix3
     distortion: tuple[Number, Number, Number, Number, Number]
     light_plane: Vector4
@@ -83,7 +91,7 @@ class ArmScene(Document):
     the links' shortening when cold, which fades with `warm_up_s`.
     """
 
-    model: str
+    model: Literal["ur3e", "ur5e", "ur10e", "ur16e", "ur20", "ur30"]
     ideal: bool = False
     length_mm: Magnitude = 0.0
     angle_deg: Magnitude = 0.0
@@ -137,7 +145,7 @@ class Panel(Document):
 
     name: str
     centre: Vector3
-    normal: Vector3
+    normal: Annotated[Vector3, AfterValidator(_a_direction)]
     size: Vector2
     thickness: Positive
     finish: Finish
@@ -185,8 +193,8 @@ class SceneDocument(Document):
     """The world as a whole. `master` is the seed of the master body, which sits undisplaced."""
 
     name: str
-    seed: int
-    master: int
+    seed: Seed
+    master: Seed
     sensor: SensorScene
     wiring: Wiring = Wiring()
     sensor_errors: SensorErrors = SensorErrors()

@@ -1,3 +1,5 @@
+import os
+
 import pytest
 
 from cell.archive.files import read_text, replace_text
@@ -61,6 +63,19 @@ def test_an_active_set_that_leads_elsewhere_is_refused(workplace):
 def test_an_active_set_that_is_gone_is_refused(workplace):
     (workplace.cell / "active.yaml").write_text("set: 2020-01-01\n")
     assert "there is no set '2020-01-01'; known: 2026" in refusal(workplace)
+
+
+def test_nominals_that_lead_in_a_circle_are_refused(workplace):
+    workplace.nominals.unlink()
+    workplace.nominals.symlink_to(workplace.nominals.name)
+    assert "jobs/demo.csv: cannot be read" in refusal(workplace)
+
+
+@pytest.mark.timeout(5)
+def test_a_pipe_is_not_waited_for(workplace):
+    workplace.nominals.unlink()
+    os.mkfifo(workplace.nominals)
+    assert "jobs/demo.csv: expected a file; came a pipe" in refusal(workplace)
 
 
 def test_a_text_without_end_is_refused(tmp_path):

@@ -19,6 +19,7 @@ IDENTIFIER = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 
 NORMAL_TOLERANCE = 0.01  # of the length 1: rounding, not another unit
 SMALLEST_DIAMETER, SMALLEST_THICKNESS = 0.1, 0.05  # mm; below, the table is in metres
+THICKEST = 100.0  # mm; above, the sheet is in micrometres
 LONGEST_BODY = 20_000.0  # mm; above, the table is in micrometres
 
 
@@ -117,6 +118,9 @@ def _check_unit(holes: Sequence[Hole], rows: Sequence[Row]) -> None:
         if 0.0 < hole.thickness < SMALLEST_THICKNESS:
             raise row.refuse(f"a sheet of {hole.thickness:g} mm looks like metres; "
                              "expected millimetres", "thickness")
+        if hole.thickness > THICKEST:
+            raise row.refuse(f"a sheet of {hole.thickness:g} mm: expected at most {THICKEST:g}, "
+                             "in millimetres", "thickness")
         if np.abs(hole.centre).max() > LONGEST_BODY:
             raise row.refuse(f"a hole {np.abs(hole.centre).max() / 1000:.4g} m from the origin: "
                              "expected millimetres")

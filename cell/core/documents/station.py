@@ -15,6 +15,7 @@ NotNegative = Annotated[float, Field(ge=0, strict=True, allow_inf_nan=False)]
 Speed = Annotated[Number, Field(gt=0, le=3.2)]
 Acceleration = Annotated[Number, Field(gt=0, le=40)]
 Exposure = Annotated[Number, Field(gt=0, le=2)]
+Host = Annotated[str, Field(pattern=r"^[A-Za-z0-9._:-]+$")]  # a name, or an address in digits
 
 
 def _ascending(pair: Vector2) -> Vector2:
@@ -33,7 +34,7 @@ class RobotSettings(Document):
 
     driver: Literal["sim", "ur"]
     model: Literal["ur3e", "ur5e", "ur10e", "ur16e", "ur20", "ur30"]
-    address: str | None = None
+    address: Host | None = None
     serial: str | None = None
     speed_rad_per_s: Speed = 1.0
     acceleration_rad_per_s2: Acceleration = 2.0
@@ -60,7 +61,7 @@ class CameraSettings(Document):
     """
 
     driver: Literal["sim", "video"]
-    source: str | int | None = None
+    source: Annotated[str, Field(min_length=1)] | int | None = None
     scene: str | None = None
     exposure_ring_s: Exposure = 0.008
     exposure_laser_s: Exposure = 0.004

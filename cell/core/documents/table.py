@@ -27,7 +27,7 @@ class Row:
     def refuse(self, message: str, column: str | None = None) -> DocumentError:
         """Build the error that names this row, and the column where it is one cell's fault."""
         name = self.cells.get("id", "")
-        place = f"line {self.line}" + (f" ({name})" if name else "")
+        place = f"line {self.line}" + (f" ({name})" if name.isprintable() and name else "")
         return DocumentError(message, source=self.source,
                              place=place + (f", column {column}" if column else ""))
 

@@ -190,12 +190,17 @@ class Controller:
         return True
 
     def safeguard(self, opened: bool) -> None:
-        """Open or close the safety gate; the program goes on by itself when it closes."""
-        self.safety = Safety.SAFEGUARD_STOP if opened else Safety.NORMAL
-        if opened:
+        """Open or close the safety gate; the program goes on by itself when it closes.
+
+        A graver stop outlasts the gate.
+        """
+        if opened and self.safety is Safety.NORMAL:
+            self.safety = Safety.SAFEGUARD_STOP
             self.pause()
-        elif self.runtime is Runtime.PAUSED:
-            self.play()
+        elif not opened and self.safety is Safety.SAFEGUARD_STOP:
+            self.safety = Safety.NORMAL
+            if self.runtime is Runtime.PAUSED:
+                self.play()
 
     def emergency_stop(self, pressed: bool) -> None:
         """Press or release the button. Release alone brings nothing back."""

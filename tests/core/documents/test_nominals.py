@@ -50,6 +50,7 @@ def test_a_normal_that_is_rounded_becomes_a_unit_vector():
     ("id,x,y", "id,x,x", ["line 1", "'x' stands twice"]),
     ("A2", "A1", ["line 3 (A1), column id", "stands twice", "line 2"]),
     ("A2", "", ["line 3, column id", "missing"]),
+    ("A2", '"A\n2"', ["line 4, column id", r"'A\n2'"]),
     ("A2", "../A2", ["line 3", "column id", "'../A2'"]),
     ("-722.5", "left", ["line 2 (A1), column y", "finite number", "'left'"]),
     ("-722.5", "nan", ["line 2 (A1), column y", "finite number", "'nan'"]),
@@ -71,6 +72,7 @@ def test_a_normal_that_is_rounded_becomes_a_unit_vector():
     ("xyd", "xyy", ["line 2 (A1), column control", "twice"]),
     (",16,1.2,", ",0.016,0.0012,", ["line 2 (A1), column diameter", "metres"]),
     (",1.2,", ",0.0012,", ["line 2 (A1), column thickness", "metres"]),
+    (",1.2,", ",1200,", ["line 2 (A1), column thickness", "at most 100"]),
     ("1450.5", "1450500", ["line 2 (A1)", "1450 m from the origin", "millimetres"]),
     ("A1", '"A1', ["not a CSV table"]),
 ])

@@ -142,3 +142,12 @@ def test_an_unknown_command_ends_the_program_instead_of_being_answered(controlle
     program.step()
     assert controller.runtime is Runtime.STOPPED
     assert "command 9" in controller.popup
+
+
+@pytest.mark.parametrize("graver", [Controller.protective_stop, lambda c: c.emergency_stop(True)])
+def test_a_gate_that_closes_releases_no_graver_stop(controller, graver):
+    graver(controller)
+    stopped = controller.safety
+    controller.safeguard(True)
+    controller.safeguard(False)
+    assert controller.safety is stopped
