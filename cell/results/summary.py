@@ -8,7 +8,7 @@ from sqlalchemy import ColumnElement, and_, func, select
 
 from cell.results.booking import Row
 from cell.results.database import Database
-from cell.results.tables import axes, bodies, calibrations, features
+from cell.results.tables import axes, bodies, calibrations, features, visits
 
 
 @dataclass(frozen=True)
@@ -25,26 +25,33 @@ class Window:
         return and_(bodies.c.cell == self.cell, bodies.c.started >= self.since,
                     bodies.c.started < self.until)
 
+    @property
+    def without_masters(self) -> ColumnElement[bool]:
+        """The same, leaving out the master: it is compared with its CMM, not with the drawing."""
+        masters = select(visits.c.recording_id).where(visits.c.kind == "master",
+                                                      visits.c.recording_id.is_not(None))
+        return and_(self.condition, bodies.c.recording_id.not_in(masters))
+
 
 def rank_failing(database: Database, window: Window) -> list[Row]:
-    """Rank the axes out of tolerance: how often, and how far at worst."""
+    """Rank the axes out of tolerance, the master's apart: how often, and how far at worst."""
     count = func.count()
     query = (select(axes.c.feature, axes.c.axis, count.label("times"),
                     func.max(func.abs(axes.c.deviation)).label("worst"),
                     func.avg(axes.c.deviation).label("mean"))
              .join(bodies, bodies.c.key == axes.c.body)
-             .where(window.condition, axes.c.verdict == "out_of_tolerance")
+             .where(window.without_masters, axes.c.verdict == "out_of_tolerance")
              .group_by(axes.c.feature, axes.c.axis).order_by(count.desc(), axes.c.feature))
     with database.transaction() as connection:
         return [dict(row) for row in connection.execute(query).mappings()]
 
 
 def rank_refusals(database: Database, window: Window) -> list[Row]:
-    """Rank the holes that were not measured, with the reason."""
+    """Rank the holes that were not measured, the master's apart, with the reason."""
     count = func.count()
     query = (select(features.c.feature, features.c.reason, count.label("times"))
              .join(bodies, bodies.c.key == features.c.body)
-             .where(window.condition, features.c.verdict == "not_measured")
+             .where(window.without_masters, features.c.verdict == "not_measured")
              .group_by(features.c.feature, features.c.reason)
              .order_by(count.desc(), features.c.feature))
     with database.transaction() as connection:

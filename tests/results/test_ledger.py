@@ -11,6 +11,7 @@ from cell.results.booking import body_rows, book
 from cell.results.database import open_database
 from cell.results.ledger import Ledger
 from cell.results.query import Filter, list_bodies
+from cell.results.summary import Window, rank_failing, rank_refusals
 from cell.results.tables import bypasses, faults, notices, visits
 from cell.results.writer import Writer
 
@@ -38,6 +39,16 @@ def test_what_the_line_has_not_acknowledged_is_found_again(ledger, database):
     found = Ledger(database, "demo", "after-a-crash").open_visits()
     assert [(v["sequence"], v["state"]) for v in found] == [(2, "judged"), (3, "measuring")]
     assert found[1] == third
+
+
+def test_the_masters_holes_are_not_ranked_among_the_bodies(ledger, database):
+    ledger.arrive({**_arrival(1), "kind": "master", "recording_id": "run-000001"})
+    for number in (1, 2):
+        with database.transaction() as connection:
+            book(connection, body_rows(booking_of(number)))
+    window = Window("demo", 0.0, 2e9)
+    assert [row["times"] for row in rank_failing(database, window)] == [1]
+    assert [row["times"] for row in rank_refusals(database, window)] == [1]
 
 
 def test_a_fault_and_a_bypass_say_who_and_how_long(ledger):
