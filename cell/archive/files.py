@@ -45,14 +45,6 @@ def read_bytes(path: Path, most: int) -> bytes:
     return content
 
 
-def write_picture(path: Path, content: bytes) -> None:
-    """Write a picture that was asked for; DocumentError where that is not possible."""
-    try:
-        path.write_bytes(content)
-    except OSError as error:
-        raise DocumentError(f"cannot be written: {error.strerror}", source=str(path)) from None
-
-
 def replace_text(path: Path, text: str) -> None:
     """Write a file in one step: after a crash it has the old text or the new, never a part.
 

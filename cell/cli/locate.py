@@ -156,7 +156,9 @@ def _print(located: Located) -> None:
 
 
 def _draw(path: Path, images: list[Image], outcome: Outcome) -> None:
-    from cell.archive.files import write_picture
     from cell.report.picture import draw_pair
 
-    write_picture(path, draw_pair(images[0], images[1], outcome))
+    try:
+        path.write_bytes(draw_pair(images[0], images[1], outcome))
+    except OSError as error:
+        raise DocumentError(f"cannot be written: {error.strerror}", source=str(path)) from None
