@@ -38,7 +38,8 @@ class TerminalOperator:
     def tell(self, message: str) -> None:
         """Print a line."""
         self._leave_glance()
-        self._console.print(message, highlight=False, markup=False, soft_wrap=True)
+        self._console.print(message, highlight=False, markup=False,
+                            soft_wrap=not self._console.is_terminal)
 
     def glance(self, line: str) -> None:
         """Print over the glance before; where that cannot be, print what is new."""

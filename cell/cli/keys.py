@@ -68,17 +68,19 @@ class Keys:
 
     def rest(self) -> None:
         """Give the terminal back as it was, for a question. What was typed before it is no answer
-        to it.
+        to it: an answer may set an arm in motion.
         """
         with self._lock:
-            if self._before is not None and termios.tcgetattr(self._fd) != self._before:
+            if self._before is not None:
                 termios.tcsetattr(self._fd, termios.TCSAFLUSH, self._before)
             self._typed.clear()
 
     def close(self) -> None:
-        """Give the terminal back for good."""
-        self.rest()
-        self.here = False
+        """Give the terminal back for good; keys that were meant for this program go with it."""
+        with self._lock:
+            if self._before is not None and termios.tcgetattr(self._fd) != self._before:
+                termios.tcsetattr(self._fd, termios.TCSAFLUSH, self._before)
+            self.here = False
 
     def _listens(self) -> bool:
         """Have the terminal hand out single keys, also after a stop and `fg`."""

@@ -27,7 +27,7 @@ def draw(board: Board, draft: str = "") -> RenderableType:
         lines.append(_body(board))
     lines.append(_strip(board.last))
     lines += [Text(warning, style="bold yellow") for warning in _warnings(board)]
-    if draft:
+    if draft and board.state != "stopped":
         lines.append(Text(f"> {draft}_", style="bold"))
     return Panel(Group(*lines), title=f"shift {board.shift}", border_style=colour)
 

@@ -11,7 +11,7 @@ from cell.core.errors import UnmeasurableError
 from cell.core.geometry import Array
 from cell.core.optics import CameraModel
 from cell.metrology.board_pose import BoardPose, BoardView
-from cell.metrology.calibration_gates import Checked, GateSet, check_gates
+from cell.metrology.calibration_gates import Checked, Gate, GateSet, check_gates
 from cell.metrology.camera_calibration import TILTED, coverage
 from cell.metrology.diversity import measure_diversity
 from cell.metrology.light_plane import LightPlaneResult, StripeOnBoard, solve_light_plane
@@ -44,7 +44,13 @@ def check_progress(views: Sequence[GatheredView], camera: CameraModel, gates: Ga
         "camera": _of_camera(views, camera), "light_plane": _of_plane(views, camera),
         "hand_eye": _of_hand_eye(views)}
     return tuple(checked for step in steps
-                 for checked in check_gates(figures[step], getattr(gates, step)))
+                 for checked in check_gates(figures[step], _with_spare(getattr(gates, step))))
+
+
+def _with_spare(gates: Mapping[str, Gate]) -> dict[str, Gate]:
+    """Want some views more than the fit has to keep."""
+    return {name: gate.model_copy(update={"at_least": (gate.at_least or 0) + SPARE})
+            if name == "used_views" else gate for name, gate in gates.items()}
 
 
 def plane_figures(result: LightPlaneResult) -> dict[str, float]:
@@ -76,5 +82,5 @@ def _of_plane(views: Sequence[GatheredView], camera: CameraModel) -> dict[str, f
 
 def _of_hand_eye(views: Sequence[GatheredView]) -> dict[str, float]:
     spread = measure_diversity(stack(view.board.camera_from_board for view in views))
-    return {"used_views": len(views) - SPARE, "tilt_range_deg": spread.tilt_range_deg,
+    return {"used_views": len(views), "tilt_range_deg": spread.tilt_range_deg,
             "roll_range_deg": spread.roll_range_deg, "axis_spread": spread.axis_spread}

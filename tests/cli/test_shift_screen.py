@@ -12,10 +12,10 @@ from cell.programs.shift.board import Board, LastBody
 from cell.programs.shift.faults import ADVICE
 
 
-def _seen(board, width=100):
+def _seen(board, width=100, draft=""):
     console = Console(width=width, record=True, file=open("/dev/null", "w"))  # noqa: PTH123, SIM115
     try:
-        console.print(draw(board))
+        console.print(draw(board, draft))
         return console.export_text()
     finally:
         console.file.close()
@@ -27,6 +27,17 @@ def test_a_body_under_measurement():
     for words in ("MEASURING", "WVW17", "hole 7 of 24", "31 s left", "TRIAL", "shift early"):
         assert words in seen
     assert "FAULT" not in seen and "BYPASS" not in seen
+
+
+def test_a_shift_that_has_stopped_shows_no_body_under_way():
+    board = Board("early", "stopped", body_id="WVW17", hole=23, holes=24,
+                  last=(LastBody(4, "WVW17", "in_tolerance", False),))
+    assert "hole 23" not in _seen(board, draft="q") and "WVW17: in tolerance" in _seen(board)
+    assert "> q" not in _seen(board, draft="q")
+
+
+def test_what_is_being_typed_is_shown():
+    assert "> b Ann wind_" in _seen(Board("early", "ready"), draft="b Ann wind")
 
 
 @pytest.mark.parametrize("fault", ADVICE)

@@ -43,7 +43,7 @@ def check(belief, identity, what="all", temperatures=WARM, **board):
 def test_all_is_met_by_the_demo_cell(belief, identity):
     lines = check(belief, identity)
     assert {line.verdict for line in lines.values()} == {"pass", "asked"}
-    assert lines["warm-up"].verdict == "asked"
+    assert lines["joints"].verdict == "asked"
     operator = Scripted()
     show_preconditions(tuple(lines.values()), operator)
     assert operator.heard("30 to 34 C") and all(operator.heard(item) for item in lines)
@@ -101,4 +101,4 @@ def test_a_cold_arm_is_seen_by_the_temperatures_of_the_last_set(belief, identity
     view = {"of": "any version", "temperatures": then}
     (home / "views.jsonl").write_text(json.dumps(view) + "\n")
     lines = check(replace(belief, folder=tmp_path), identity)
-    assert lines["warm-up"].verdict == verdict
+    assert lines["joints"].verdict == verdict

@@ -61,7 +61,7 @@ class Precondition(Document):
     advice: str = ""
 
     def __str__(self) -> str:
-        return f"{self.item}: {self.found}, wanted {self.wanted}. {self.advice}".strip()
+        return f"{self.item}: {self.found}, wanted: {self.wanted}"
 
 
 class PlacedBoard(Document):

@@ -128,6 +128,9 @@ class Opening:
         self.operator.tell(f"controller software {self.station.identity.software}, active set "
                            f"{self.belief.set_id}")
         show_preconditions(lines, self.operator)
+        for board in boards:
+            self.operator.tell(f"board {board.id}: {board.squares[0]} x {board.squares[1]} squares "
+                               f"of {board.square_mm:g} mm; {board.certificate or '-'}")
         accepted = accept_preconditions(lines, self.plan.reason, self.operator)
         warm = ", and is the arm warm (half an hour of motion)" \
             if any(line.verdict == "asked" for line in lines) else ""

@@ -23,6 +23,7 @@ from cell.programs.calibration.belief import Belief
 from cell.programs.calibration.session import VIEWS
 
 Verdict = Literal["pass", "asked", "warn", "refuse"]
+WIDE = 30     # letters of what was found
 COLDER = 4.0  # K: a metre of steel or aluminium is then some 0.05 to 0.1 mm shorter
 HAND_EYE_TOO = "calibrate `hand-eye` or `all`: the light plane alone would keep the old hand-eye"
 
@@ -37,13 +38,13 @@ def check_preconditions(what: str, belief: Belief, boards: Sequence[BoardDocumen
 
 
 def show_preconditions(lines: Sequence[Precondition], operator: Operator) -> None:
-    """Show them as one table."""
-    rows = [("", "found", "wanted", ""), *((one.item, one.found, one.wanted, one.verdict)
+    """Show them as one table that fits a terminal of 80 columns."""
+    rows = [("", "", "found", "wanted"), *((one.verdict, one.item, _cut(one.found), one.wanted)
                                            for one in lines)]
     wide = [max(len(row[column]) for row in rows) for column in range(3)]
-    for row in rows:
-        operator.tell("  ".join(text.ljust(width) for text, width in zip(row, wide, strict=False))
-                      + f"  {row[3]}")
+    for *row, wanted in rows:
+        shown = "  ".join(text.ljust(width) for text, width in zip(row, wide, strict=True))
+        operator.tell(f"  {shown}  {wanted}")
 
 
 def accept_preconditions(lines: Sequence[Precondition], reason: str, operator: Operator) -> str:
@@ -54,17 +55,18 @@ def accept_preconditions(lines: Sequence[Precondition], reason: str, operator: O
     """
     refused = [one for one in lines if one.verdict == "refuse"]
     if refused:
-        raise DocumentError(" ".join(map(str, refused)), source="preconditions")
+        raise DocumentError("; ".join(f"{one}: {one.advice}" for one in refused),
+                            source="preconditions")
     warned = [one for one in lines if one.verdict == "warn"]
     for one in warned:
-        operator.tell(f"! {one}")
+        operator.tell(f"! {one}. {one.advice}")
     if not warned:
         return ""
     given = reason or operator.ask("Why may it be calibrated all the same? The reason goes into "
                                    "the set. (empty: it may not)", "")
     if not given.strip():
         raise DocumentError("not accepted without a reason (at the terminal, or `reason` in the "
-                            f"plan): {' '.join(map(str, warned))}", source="preconditions")
+                            f"plan): {'; '.join(map(str, warned))}", source="preconditions")
     return given.strip()
 
 
@@ -103,8 +105,8 @@ def _sensor(what: str, belief: Belief) -> Precondition:
 
 def _certificate(board: BoardDocument, today: date) -> Precondition:
     """The size of the squares is the scale of everything, and no residual shows it."""
-    item, wanted = f"board {board.id}", "certificate, valid today"
-    name = f"{board.certificate or 'no certificate'}, {_until(board)}"
+    item, wanted = f"board {board.id}", "valid today"
+    name = _until(board) if board.certificate else "no certificate"
     if board.certificate and _is_valid(board, today):
         return Precondition(item=item, found=name, wanted=wanted)
     return Precondition(item=item, found=name, wanted=wanted, verdict="warn", advice=(
@@ -113,7 +115,7 @@ def _certificate(board: BoardDocument, today: date) -> Precondition:
 
 
 def _until(board: BoardDocument) -> str:
-    return f"until {board.certified_until}" if board.certified_until else "without a last day"
+    return f"valid until {board.certified_until}" if board.certified_until else "without a last day"
 
 
 def _is_valid(board: BoardDocument, today: date) -> bool:
@@ -128,12 +130,11 @@ def _warmth(views: Path, temperatures: Sequence[float]) -> Precondition:
     found = _degrees(temperatures)
     known = _temperatures_in(views)
     if not known or len(known) != len(temperatures):
-        return Precondition(item="warm-up", found=found, wanted="warm: the last set does not say",
-                            verdict="asked")
+        return Precondition(item="joints", found=found, wanted="warm", verdict="asked")
     colder = float(np.max(np.subtract(known, temperatures)))
     if colder <= COLDER:
-        return Precondition(item="warm-up", found=found, wanted=f"as then: {_degrees(known)}")
-    return Precondition(item="warm-up", found=found, wanted=f"as then: {_degrees(known)}",
+        return Precondition(item="joints", found=found, wanted=f"{_degrees(known)} then")
+    return Precondition(item="joints", found=found, wanted=f"{_degrees(known)} then",
                         verdict="warn", advice=f"A joint is {colder:.0f} K colder than when the "
                         "active set was made: let the arm move for half an hour.")
 
@@ -164,4 +165,8 @@ def _row(values: Sequence[float]) -> str:
 def _degrees(temperatures: Sequence[float]) -> str:
     if not temperatures:
         return "not told"
-    return f"joints {min(temperatures):.0f} to {max(temperatures):.0f} C"
+    return f"{min(temperatures):.0f} to {max(temperatures):.0f} C"
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= WIDE else text[:WIDE - 3] + "..."
