@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
-from typing import Any, TypeAlias, get_args
+from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
+from cell.core.documents.shape import Path, kind_at, name_shape
 from cell.core.errors import DocumentError
 
-Path: TypeAlias = tuple[str | int, ...]
-
 MOST = 5  # faults named in one message
+
+OF_ANOTHER_SHAPE = ("missing", "too_long", "too_short", "tuple_type", "list_type", "dict_type",
+                    "model_type", "string_type", "int_type", "float_type", "bool_type")
 
 
 def complain(error: ValidationError, model: type[BaseModel], value: object,
@@ -48,23 +50,24 @@ def _known(location: Path, lines: Mapping[Path, int]) -> Path:
 
 def _sentence(fault: Mapping[str, Any], model: type[BaseModel], value: object, path: Path) -> str:
     kind, location = fault["type"], fault["loc"]
-    if kind == "missing":
-        return (f"the key {location[-1]!r} is missing" if isinstance(location[-1], str)
-                else f"expected a longer list; came {_came(fault['input'])}")
+    if kind == "missing" and isinstance(location[-1], str):
+        return f"the key {location[-1]!r} is missing"
     if kind == "extra_forbidden":
         return _unknown(str(location[-1]), _keys(model, location[:-1]))
     if not path and not isinstance(value, dict):
         return f"expected a mapping with the keys {', '.join(model.model_fields)}; " \
                f"came {_came(value)}"
-    return f"{_expected(fault)}; came {_came(fault['input'])}{_hint(kind, fault['input'])}"
+    shape = name_shape(kind_at(model, path)) if kind in OF_ANOTHER_SHAPE else None
+    expected = _expected(fault) if shape is None else f"expected {shape}"
+    return f"{expected}; came {_came(fault['input'])}{_hint(kind, fault['input'])}"
 
 
 def _expected(fault: Mapping[str, Any]) -> str:
-    if fault["type"] == "too_long":
-        return f"expected at most {fault['ctx']['max_length']} values"
     if fault["type"] == "string_pattern_mismatch":
         return f"expected text of the pattern {fault['ctx']['pattern']}"
     words: str = fault["msg"]
+    for comparison in ("greater", "less"):
+        words = words.replace(f"Input should be {comparison}", f"expected a number {comparison}")
     return words.removeprefix("Value error, ").replace("Input should be", "expected")
 
 
@@ -100,7 +103,8 @@ def _came(value: object) -> str:
     if isinstance(value, dict):
         return f"a mapping with {len(value)} keys"
     if isinstance(value, tuple):
-        return f"a list of {len(value)}" if len(value) > 6 else f"the list {list(value)}"
+        short = len(value) <= 6 and not any(isinstance(each, tuple | dict) for each in value)
+        return f"the list {list(value)}" if short else f"a list of {len(value)}"
     return f"{value}" if len(f"{value}") <= 60 else "a number of very many digits"
 
 

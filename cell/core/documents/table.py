@@ -13,6 +13,7 @@ from cell.core.errors import DocumentError
 
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
 LARGEST = 1e12  # what lies beyond is no measure of anything
+ALSO_CALLED = {"d": "diameter", "diameter": "d"}  # measured points have d, nominals a diameter
 DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+", re.ASCII)
 
 
@@ -104,13 +105,15 @@ def _header_problems(header: list[str], required: tuple[str, ...],
         if header.count(column) > 1:
             yield f"the column {column!r} stands twice"
         if column not in required + optional:
-            yield f"the column {column!r} is unknown{_advice(column, required + optional)}"
+            absent = [name for name in required + optional if name not in header]
+            yield f"the column {column!r} is unknown{_advice(column, absent)}"
     if missing := [column for column in required if column not in header]:
         yield f"missing: {', '.join(missing)}"
 
 
-def _advice(name: str, known: tuple[str, ...]) -> str:
-    near = get_close_matches(name, known, n=1)
+def _advice(name: str, known: Sequence[str]) -> str:
+    other = ALSO_CALLED.get(name.lower())
+    near = [other] if other in known else get_close_matches(name.lower(), known, n=1)
     return f" (did you mean {near[0]!r}?)" if near else ""
 
 

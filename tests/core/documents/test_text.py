@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cell.core.documents import strict_yaml
-from cell.core.documents.base import Document, Number
+from cell.core.documents.base import Document, Matrix4, Number, Vector3
 from cell.core.documents.job import JobDocument
 from cell.core.documents.strict_yaml import read_tree
 from cell.core.documents.text import dump, parse
@@ -33,13 +33,13 @@ def refusal(text: str) -> str:
     (JOB + "stand_off_mm: .nan\n", ["line 4", "finite number", "came nan"]),
     (JOB + "stand_off_mm: .inf\n", ["line 4", "finite number", "came inf"]),
     (JOB + "stand_off_mm: 1e999\n", ["line 4", "finite number"]),
-    (JOB + "stand_off_mm: wide\n", ["line 4", "valid number", "the text 'wide'"]),
-    (JOB + "stand_off_mm: '250'\n", ["line 4", "valid number", "without quotes"]),
-    (JOB + "stand_off_mm: 250,5\n", ["line 4", "valid number", "decimal point"]),
-    (JOB + "stand_off_mm: true\n", ["line 4", "valid number", "came true"]),
-    (JOB + "retry: {attempts: 2.5}\n", ["line 4, retry.attempts", "valid integer", "came 2.5"]),
+    (JOB + "stand_off_mm: wide\n", ["line 4", "expected a number", "the text 'wide'"]),
+    (JOB + "stand_off_mm: '250'\n", ["line 4", "expected a number", "without quotes"]),
+    (JOB + "stand_off_mm: 250,5\n", ["line 4", "expected a number", "decimal point"]),
+    (JOB + "stand_off_mm: true\n", ["line 4", "expected a number", "came true"]),
+    (JOB + "retry: {attempts: 2.5}\n", ["line 4, retry.attempts", "expected a whole number", "came 2.5"]),
     (JOB + "method: fast\n", ["line 4, method", "'joint' or 'two-step'", "'fast'"]),
-    (JOB.replace("sill\n", "12\n", 1), ["line 1, name", "valid string", "put it into quotes"]),
+    (JOB.replace("sill\n", "12\n", 1), ["line 1, name", "expected text", "put it into quotes"]),
     (JOB.replace("sill\n", "../sill\n", 1), ["line 1, name", "pattern"]),
     (JOB + "stops:\n - {hole: A, joints_deg: [1, 2, 3]}\n", ["line 5", "joints_deg",
                                                               "longer list", "[1, 2, 3]"]),
@@ -80,6 +80,29 @@ def test_all_faults_of_a_document_are_named_at_once():
     assert "line 4, method" in message
     assert "also line 5, retry.attempts" in message
     assert "also line 6, body" in message
+
+
+class Shapes(Document):
+    matrix: Matrix4 | None = None
+    pair: tuple[int, int] = (0, 0)
+    any_length: tuple[Number, ...] = ()
+    by_name: dict[str, Vector3] = {}
+
+
+@pytest.mark.parametrize(("written", "said"), [
+    ("matrix: [[1, 0, 0, 0]]", "line 1, matrix: expected 4 rows of 4 numbers; came a list of 1"),
+    ("matrix: [[1, 2], 3, 4, 5]",
+     "matrix[0]: expected a list of 4 numbers; came the list [1, 2]"),
+    ("pair: [768]", "pair: expected a list of 2 whole numbers; came the list [768]"),
+    ("pair: [1, 2, 3]", "pair: expected a list of 2 whole numbers; came the list [1, 2, 3]"),
+    ("any_length: 7", "any_length: expected a list of numbers; came 7"),
+    ("by_name: 7", "by_name: expected a mapping; came 7"),
+    ("by_name: {a: [1, 2]}", "by_name.a: expected a list of 3 numbers; came the list [1, 2]"),
+])
+def test_a_value_of_another_shape_is_told_which_one_was_expected(written, said):
+    with pytest.raises(DocumentError) as refused:
+        parse(Shapes, written, "shapes")
+    assert said in str(refused.value)
 
 
 class Values(Document):
