@@ -1,4 +1,5 @@
 import json
+from pathlib import Path
 
 import pytest
 
@@ -43,7 +44,7 @@ def test_what_cannot_be_compared_ends_with_2(cell, workplace, words, said):
 
 def test_a_diameter_under_the_other_tables_name_is_told(cell, workplace):
     for name, column in (("measured", "diameter"), ("nominals", "d")):
-        (workplace / f"{name}.csv").write_text(f"id,x,y,z,{column}\nA,1,2,3,8\n")
-    (workplace / "plain.csv").write_text("id,x,y,z\nA,1,2,3\n")
+        Path(f"{name}.csv").write_text(f"id,x,y,z,{column}\nA,1,2,3,8\n")
+    Path("plain.csv").write_text("id,x,y,z\nA,1,2,3\n")
     assert "did you mean 'd'?" in cell("compare", "measured.csv", "plain.csv")[2]
     assert "did you mean 'diameter'?" in cell("compare", "plain.csv", "nominals.csv")[2]
