@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from cell.core.geometry import Array, Plane
 
-ALMOST = 1e-9  # of normalised coordinates: one step further, and nothing is left to correct
+ALMOST = 1e-6  # of normalised coordinates: the step from there leaves its square, 1e-12
 NEWTON_STEPS = 6  # quadratic: four suffice for the lenses met, two are for the others
 
 
@@ -34,7 +34,7 @@ class CameraModel:
     def to_pixels(self, normalised: ArrayLike) -> Array:
         """Distort normalised coordinates (..., 2) and turn them into pixels (..., 2)."""
         x, y = _parts(normalised)
-        x_d, y_d, *_ = _distort(x, y, self.distortion)
+        x_d, y_d = _distort(x, y, self.distortion)
         k = self.matrix
         return _pairs(k[0, 0] * x_d + k[0, 1] * y_d + k[0, 2], k[1, 1] * y_d + k[1, 2])
 
@@ -49,26 +49,29 @@ class CameraModel:
         x_d = (u - k[0, 2] - k[0, 1] * y_d) / k[0, 0]
         x, y = x_d, y_d
         for _ in range(NEWTON_STEPS):
-            f, g, f_x, f_y, g_x, g_y = _distort(x, y, self.distortion)
-            f, g, determinant = f - x_d, g - y_d, f_x * g_y - f_y * g_x
-            x = x - (g_y * f - f_y * g) / determinant
-            y = y - (f_x * g - g_x * f) / determinant
+            f, g, by_x, mixed, by_y = _linearise(x, y, self.distortion)
+            f, g = f - x_d, g - y_d
+            determinant = by_x * by_y - mixed * mixed
+            x = x - (by_y * f - mixed * g) / determinant
+            y = y - (by_x * g - mixed * f) / determinant
             if max(np.abs(f).max(initial=0.0), np.abs(g).max(initial=0.0)) < ALMOST:
                 break
         return _pairs(x, y)
 
-    def pixel_by_normalised(self, normalised: ArrayLike) -> Array:
-        """Differentiate pixels by normalised coordinates (..., 2): matrices (..., 2, 2)."""
+    def normalised_by_pixel(self, normalised: ArrayLike) -> Array:
+        """Differentiate normalised coordinates (..., 2) by pixels: matrices (..., 2, 2)."""
         x, y = _parts(normalised)
-        _, _, f_x, f_y, g_x, g_y = _distort(x, y, self.distortion)
-        rows = np.empty((*x.shape, 2, 2))
-        rows[..., 0, 0], rows[..., 0, 1], rows[..., 1, 0], rows[..., 1, 1] = f_x, f_y, g_x, g_y
-        return self.matrix[:2, :2] @ rows
+        _, _, by_x, mixed, by_y = _linearise(x, y, self.distortion)
+        back = np.empty((*x.shape, 2, 2))
+        back[..., 0, 0], back[..., 1, 1] = by_y, by_x
+        back[..., 0, 1] = back[..., 1, 0] = -mixed
+        back /= (by_x * by_y - mixed * mixed)[..., None, None]
+        return np.asarray(np.dot(back, np.linalg.inv(self.matrix[:2, :2])))
 
     def pixel_by_intrinsics(self, normalised: ArrayLike) -> Array:
         """Differentiate pixels by fx, fy, cx, cy, k1, k2, p1, p2, k3: matrices (..., 2, 9)."""
         x, y = _parts(normalised)
-        x_d, y_d, *_ = _distort(x, y, self.distortion)
+        x_d, y_d = _distort(x, y, self.distortion)
         r2, xy = x * x + y * y, 2.0 * x * y
         matrices = np.zeros((*x.shape, 2, 9))
         matrices[..., 0, 0], matrices[..., 1, 1] = x_d, y_d
@@ -97,19 +100,29 @@ def _pairs(first: Array, second: Array) -> Array:
     return both
 
 
-def _distort(x: Array, y: Array, distortion: Array) -> tuple[Array, ...]:
-    """Apply the Brown-Conrady model: (x_d, y_d) and dx_d/dx, dx_d/dy, dy_d/dx, dy_d/dy."""
+def _distort(x: Array, y: Array, distortion: Array) -> tuple[Array, Array]:
+    """Apply the Brown-Conrady model: x_d and y_d."""
+    _, _, p1, p2, _ = distortion
+    r2, scale = _stretch(x, y, distortion)
+    return x * scale + p2 * r2, y * scale + p1 * r2
+
+
+def _linearise(x: Array, y: Array, distortion: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Give x_d and y_d, and how they change: dx_d/dx, dx_d/dy (which is dy_d/dx too), dy_d/dy."""
+    k1, k2, p1, p2, k3 = distortion
+    r2, scale = _stretch(x, y, distortion)
+    bend = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * (3.0 * k3)))
+    return (x * scale + p2 * r2, y * scale + p1 * r2,
+            scale + (bend * x + 4.0 * p2) * x,
+            bend * x * y + 2.0 * (p1 * x + p2 * y),
+            scale + (bend * y + 4.0 * p1) * y)
+
+
+def _stretch(x: Array, y: Array, distortion: Array) -> tuple[Array, Array]:
+    """Give r² and what the model multiplies both x and y by."""
     k1, k2, p1, p2, k3 = distortion
     r2 = x * x + y * y
-    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    slope = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3))
-    cross = slope * x * y + 2.0 * (p1 * x + p2 * y)
-    return (x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-            radial + slope * x * x + 2.0 * p1 * y + 6.0 * p2 * x,
-            cross,
-            cross,
-            radial + slope * y * y + 6.0 * p1 * y + 2.0 * p2 * x)
+    return r2, 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3)) + 2.0 * (p1 * y + p2 * x)
 
 
 @dataclass(frozen=True, eq=False)

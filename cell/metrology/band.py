@@ -47,6 +47,16 @@ class Band:
         """How the grey rises outward (n, m), per px."""
         return np.asarray(np.gradient(self.grey, self.step, axis=1))
 
+    @cached_property
+    def normals(self) -> Array:
+        """The unit outward normals (n, 2) that the profiles follow."""
+        return self.ellipse.normals(self.t)
+
+    @cached_property
+    def design(self) -> Array:
+        """How the ellipse moves along the profiles with each of its five numbers (n, 5)."""
+        return self.ellipse.design(self.t)
+
     def levels(self, beside: float) -> tuple[Array, Array]:
         """Give the mean grey of each profile further than `beside` px inside and outside (n,)."""
         inner, outer = self.offsets < -beside, self.offsets > beside
@@ -78,7 +88,8 @@ def sample_band(patch: Patch, ellipse: Ellipse, offsets: Array, rays: int) -> Ba
     Bilinear; beyond the patch the grey of its border goes on.
     """
     t = np.linspace(0.0, 2.0 * np.pi, rays, endpoint=False)
-    feet, normals = (ellipse.points(t) - patch.origin)[:, None], ellipse.normals(t)[:, None]
-    x, y = np.moveaxis((feet + offsets[:, None] * normals).astype(np.float32), -1, 0)
+    feet, normals = ellipse.points(t) - patch.origin, ellipse.normals(t)
+    x, y = ((feet[:, axis, None] + normals[:, axis, None] * offsets).astype(np.float32)
+            for axis in (0, 1))
     grey = cv2.remap(patch.grey, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return Band(ellipse, t, offsets, grey.astype(np.float64))

@@ -118,7 +118,7 @@ def _rim(band: Band, edge: Array, good: Mask, profile: Profile, hole: Hole) -> R
     ellipse, miss, scale = settle(band, Edges(ray, edge[ray], edge[ray]), floor=0.01)
     check_round(ellipse, scale)
     kept = np.abs(miss) < 3.5 * scale
-    normals = band.ellipse.normals(band.t[ray])
+    normals = band.normals[ray]
     # A blurred disc looks smaller: its half level lies s**2 / 2R inside.
     bend = profile.blur**2 / (2.0 * ellipse.radius)
     points = band.ellipse.points(band.t[ray]) + (edge[ray] + bend)[:, None] * normals

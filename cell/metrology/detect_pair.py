@@ -16,6 +16,7 @@ from cell.metrology.find_holes import Hole, find_holes
 from cell.metrology.gates import COMPLETE, check_lit, why_no_hole
 from cell.metrology.reasons import Reason, refusal
 from cell.metrology.ridge import Ridge, find_ridges, runs_upright
+from cell.metrology.spread import middle
 
 FAINT = 0.2       # of the contrast of another hole in the same picture
 ANYWHERE = 100.0  # mm, the standard deviation of where a hole may be in the picture
@@ -69,7 +70,7 @@ def _check_radius(ridge: Ridge, image: Image, sensor: SensorModel, expected: Exp
 
 
 def _brighter(image: Image, other: Image) -> bool:
-    return bool(np.median(image[::8, ::8]) > np.median(other[::8, ::8]))
+    return middle(image[::8, ::8].ravel()) > middle(other[::8, ::8].ravel())
 
 
 def _at_depth(expected: Expected, ridge: Ridge, sensor: SensorModel) -> Expected:

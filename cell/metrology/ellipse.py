@@ -55,7 +55,8 @@ class Ellipse:
 
     def normals(self, t: Array) -> Array:
         """Give the unit outward normals (n, 2) at the parameters t (n,)."""
-        outward = _circle(t) @ np.linalg.inv(self.shape)
+        (a, b), (_, c) = self.shape
+        outward = _circle(t) @ np.array([[c, -b], [-b, a]])  # the inverse, but for its scale
         return outward / np.hypot(outward[:, :1], outward[:, 1:])
 
     def design(self, t: Array) -> Array:

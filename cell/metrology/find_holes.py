@@ -23,6 +23,7 @@ SMALLEST_RADIUS = 14.0  # px, of a hole that nothing is known of
 RAYS = 120
 MARGIN = 0.25           # of the radius, on either side of the rim, that is looked at
 LEAST_COVERAGE = 0.4    # of the rim, to be a hole at all
+FEW_VOTES = 0.1         # of those for a hole that was found, below which nobody looks
 EDGE_WIDTH = 2.5        # px over which the step of a sharp edge extends
 
 
@@ -47,13 +48,16 @@ def find_holes(image: Image, camera: CameraModel, expected: Expected) -> Iterato
     """
     left, top, right, bottom = _region(camera, expected)
     part = image[top:bottom, left:right]
-    octaves = _octaves(camera, expected, min(part.shape))
+    octaves, most = _octaves(camera, expected, min(part.shape)), 0.0
     for inside in (-1, +1):
         circles = [circle for radii in octaves for circle in vote_for_circles(part, radii, inside)]
         for circle in sorted(circles, key=lambda circle: -circle.votes):
+            if circle.votes < FEW_VOTES * most:
+                break
             placed = replace(circle, x=circle.x + left, y=circle.y + top)
             hole = _look(image, placed, expected, camera)
             if hole is not None:
+                most = max(most, circle.votes)
                 yield hole
 
 

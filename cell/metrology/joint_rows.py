@@ -83,8 +83,8 @@ class Sight:
     def of(cls, features: Rim | Stripe, camera: CameraModel) -> Sight:
         """Undistort the points of a rim or of a stripe."""
         rays = camera.rays(features.points)
-        by_pixel = np.asarray(np.linalg.inv(camera.pixel_by_normalised(rays[:, :2])), np.float64)
-        return cls(rays, by_pixel, features.sigma, max(1.0, features.correlation))
+        return cls(rays, camera.normalised_by_pixel(rays[:, :2]), features.sigma,
+                   max(1.0, features.correlation))
 
     @cached_property
     def conic(self) -> Array:

@@ -33,51 +33,57 @@ class Profile:
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
-    """The step S: its `shape` (n, m), and how it changes with e, s, w and k: `slopes` (n, 4, m)."""
+class Comparison:
+    """What grey profiles say of a step once two levels of each ray are fitted: the `height` of the
+    step (n,), the `misfit` (n,) that remains (rms), both in grey values; and with the slopes of the
+    step, what the two levels can explain taken out of them, their `products` (n, p, p) with each
+    other and their `pulls` (n, p): products with what remains.
+    """
 
-    shape: Array
-    slopes: Array
+    height: Array
+    misfit: Array
+    products: Array
+    pulls: Array
 
 
-def shape_step(offsets: Array, profile: Profile) -> Step:
-    """Give the step S of every profile at `offsets` (m,) px, and its slopes."""
+def shape_step(offsets: Array, profile: Profile) -> Array:
+    """Give how the step S of every profile changes with e, s, w and k, and S itself (n, 5, m)."""
     near = (offsets - profile.edge[:, None]) / profile.blur
     shown = np.maximum(profile.width, 0.0)[:, None]
     far, share = near + shown / profile.blur, profile.share[:, None]
-    bell_near, bell_far = (1.0 - share) * _bell(near), share * _bell(far)
-    lift_near, lift_far = ndtr(near), ndtr(far)
-    by_wall = lift_far - lift_near
-    slopes = np.stack([-(bell_near + bell_far), -(bell_near * near + bell_far * far),
-                       bell_far * (shown > 0.0), by_wall * profile.blur], axis=1) / profile.blur
-    return Step(lift_near + share * by_wall, slopes)
+    bell_near, bell_far = (share - 1.0) * _bell(near), share * _bell(far)
+    lift = ndtr(near)
+    step = np.empty((len(near), 5, len(offsets)))
+    step[:, 0] = (bell_near - bell_far) / profile.blur
+    step[:, 1] = (bell_near * near - bell_far * far) / profile.blur
+    step[:, 2] = bell_far * (shown > 0.0) / profile.blur
+    step[:, 3] = ndtr(far) - lift
+    step[:, 4] = lift + share * step[:, 3]
+    return step
 
 
-def shape_edge(offsets: Array, profile: Profile) -> Step:
-    """Give the step S of every profile, and its slope by where the sheet ends alone: (n, 1, m)."""
+def shape_edge(offsets: Array, profile: Profile) -> Array:
+    """Give how the step S changes with e alone, and S (n, 2, m)."""
     near = (offsets - profile.edge[:, None]) / profile.blur
     far = near + np.maximum(profile.width, 0.0)[:, None] / profile.blur
     share = profile.share[:, None]
-    slope = (share - 1.0) * _bell(near) - share * _bell(far)
-    return Step((1.0 - share) * ndtr(near) + share * ndtr(far), slope[:, None] / profile.blur)
+    step = np.empty((len(near), 2, len(offsets)))
+    step[:, 0] = ((share - 1.0) * _bell(near) - share * _bell(far)) / profile.blur
+    step[:, 1] = (1.0 - share) * ndtr(near) + share * ndtr(far)
+    return step
 
 
-def fit_levels(grey: Array, shape: Array) -> tuple[Array, Array]:
-    """Fit the two levels of every ray: residuals (n, m) and height of the step (n,)."""
-    high = shape - shape.mean(axis=1, keepdims=True)
-    centred = grey - grey.mean(axis=1, keepdims=True)
-    square = np.einsum("nm,nm->n", high, high)
-    height = np.einsum("nm,nm->n", high, centred) / np.maximum(square, 1e-9)
-    return centred - height[:, None] * high, height
-
-
-def without_levels(slopes: Array, shape: Array) -> Array:
-    """Take out of slopes (n, p, m) what the two levels of each ray can explain."""
-    high = shape - shape.mean(axis=1, keepdims=True)
-    square = np.maximum(np.einsum("nm,nm->n", high, high), 1e-9)
-    centred = slopes - slopes.mean(axis=2, keepdims=True)
-    along = centred @ (high / square[:, None])[..., None]
-    return np.asarray(centred - along * high[:, None])
+def compare(grey: Array, step: Array) -> Comparison:
+    """Compare profiles (n, m) with a step and its slopes before it (n, p + 1, m)."""
+    signals = np.concatenate([step, grey[:, None]], axis=1)
+    signals -= np.einsum("nsm->ns", signals)[..., None] / grey.shape[1]  # short rows: fast so
+    products = signals @ signals.swapaxes(1, 2)
+    share = products[:, -2] / np.maximum(products[:, -2, -2], 1e-9)[:, None]
+    products -= share[:, :, None] * products[:, None, -2]
+    height = share[:, -1]
+    misfit = np.sqrt(np.maximum(products[:, -1, -1], 0.0) / grey.shape[1])
+    return Comparison(height, misfit, products[:, :-2, :-2] * (height**2)[:, None, None],
+                      products[:, :-2, -1] * height[:, None])
 
 
 def _bell(x: Array) -> Array:

@@ -14,12 +14,13 @@ import numpy as np
 from cell.core.geometry import Array
 from cell.metrology.arrays import Mask
 from cell.metrology.band import Band
-from cell.metrology.profile import Profile, fit_levels, shape_edge, shape_step, without_levels
+from cell.metrology.profile import Profile, compare, shape_edge, shape_step
 from cell.metrology.spread import middle, tukey_weights
 from cell.metrology.wall import Wall
 
 STEPS = 7
 SETTLED = 0.005       # px and shares: below, the fit has arrived
+FEW = 64              # rays tell which wall it is
 THINNED = 2           # every second ray tells enough of blur and wall
 DARKEST, BRIGHTEST = -0.6, 1.3        # k
 NOTABLE_WALL = 1.5                    # px
@@ -32,7 +33,7 @@ class RimModel:
 
     def __init__(self, band: Band, wall: Wall) -> None:
         self.shrink = wall.shrink
-        self.design, self.normals = band.ellipse.design(band.t), band.ellipse.normals(band.t)
+        self.design, self.normals = band.design, band.normals
         self.around = np.column_stack([np.ones_like(band.t), np.cos(band.t), np.sin(band.t)])
         self.prior = np.array([0.0] * 5 + [USUAL_BLUR, *wall.shift, wall.share, 0.0, 0.0])
         self.sigma = np.array([np.inf] * 6 + [wall.sigma] * 2
@@ -72,58 +73,58 @@ def fit_profile(band: Band, rays: Mask, walls: list[Wall], *, doubled: bool = Tr
         walls: what the wall may be; the first is preferred.
         doubled: whether two rims may show.
     """
-    sparse = band[np.nonzero(rays)[0][::THINNED]]
+    used = np.flatnonzero(rays)
+    few = band[used[::-(-len(used) // FEW)]]
     best, least, chosen = np.zeros(11), np.inf, walls[0]
     for wall in walls:
-        model = RimModel(sparse, wall)
+        model = RimModel(few, wall)
         starts = [model.prior]
         if doubled and wall.widest > NOTABLE_WALL:
             starts.append(model.prior + model.onto_near_rim(wall))
         if wall is not walls[0] and not doubled:
             starts = [np.append(best[:6], model.prior[6:])]  # another wall, and else not far
         for start in starts:
-            state, misfit = _descend(model, sparse, start)
+            state, misfit = _descend(model, few, start)
             if misfit < wall.worth * least:
                 best, least, chosen = state, misfit, wall
+    thinned = band[used[::THINNED]]
+    best, _ = _descend(RimModel(thinned, chosen), thinned, best)
     return RimModel(band, chosen).read(best)
 
 
 def _descend(model: RimModel, band: Band, state: Array) -> tuple[Array, float]:
-    """Fit from a start (Gauss-Newton): the numbers, and the usual misfit of a ray in grey."""
+    """Fit from a start (Gauss-Newton): the numbers, and the mean misfit of a ray in grey."""
     rows = model.rows()
-    flat = rows.reshape(-1, len(state))
+    flat, misfit = rows.reshape(-1, len(state)), np.inf
     for _ in range(STEPS):
-        step = shape_step(band.offsets, model.read(state))
-        miss, height = fit_levels(band.grey, step.shape)
-        slopes = without_levels(step.slopes, step.shape)
-        rough = np.sqrt(np.einsum("nm,nm->n", miss, miss) / miss.shape[1])
-        scale = max(middle(rough), 1e-3)
-        weight = tukey_weights(np.maximum(rough - scale, 0.0), scale)
-        weighted = slopes * (weight * height)[:, None, None]
-        products = weighted @ (slopes * height[:, None, None]).swapaxes(1, 2)
-        pulls = (weighted @ miss[..., None])[..., 0]
+        seen = compare(band.grey, shape_step(band.offsets, model.read(state)))
+        misfit, scale = float(seen.misfit.mean()), max(middle(seen.misfit), 1e-3)
+        weight = tukey_weights(np.maximum(seen.misfit - scale, 0.0), scale)
         stiff = PIXELS_PER_ERROR * (scale / model.sigma) ** 2
-        normal = flat.T @ (products @ rows).reshape(flat.shape)
-        right = flat.T @ pulls.ravel() + stiff * (model.prior - state)
+        weighed = (seen.products * weight[:, None, None]) @ rows
+        normal = flat.T @ weighed.reshape(flat.shape)
+        right = flat.T @ (seen.pulls * weight[:, None]).ravel() + stiff * (model.prior - state)
         move = np.clip(np.linalg.solve(normal + np.diag(stiff + 1e-9), right), -0.5, 0.5)
         state = state + move
         if np.abs(move).max() < SETTLED:
             break
-    miss, _ = fit_levels(band.grey, shape_step(band.offsets, model.read(state)).shape)
-    return state, float(np.sqrt((miss**2).mean(axis=1)).mean())
+    return state, misfit
 
 
 def locate_edges(band: Band, profile: Profile) -> tuple[Array, Array, Array]:
     """Locate the sheet's end on every ray by itself: offset (n,) px; and how high its step is and
     how badly it fits, both (n,) in grey values.
     """
-    found = profile
-    for _ in range(2):
-        step = shape_edge(band.offsets, found)
-        miss, height = fit_levels(band.grey, step.shape)
-        slope = without_levels(step.slopes, step.shape)[:, 0] * height[:, None]
-        square = np.maximum(np.einsum("nm,nm->n", slope, slope), 1e-9)
-        move = np.einsum("nm,nm->n", slope, miss) / square
-        found = replace(found, edge=found.edge + np.clip(move, -1.0, 1.0))
-    miss, height = fit_levels(band.grey, shape_edge(band.offsets, found).shape)
-    return found.edge, height, np.sqrt((miss**2).mean(axis=1))
+    nearer, _, _ = _nearer(band, profile)
+    nearest, height, misfit = _nearer(band, nearer)
+    return nearest.edge, height, misfit
+
+
+def _nearer(band: Band, profile: Profile) -> tuple[Profile, Array, Array]:
+    """Move the edges of a profile once (Newton): the height of the step, and what then remains."""
+    seen = compare(band.grey, shape_edge(band.offsets, profile))
+    square, pull = np.maximum(seen.products[:, 0, 0], 1e-9), seen.pulls[:, 0]
+    move = np.clip(pull / square, -1.0, 1.0)
+    explained = move * (2.0 * pull - move * square) / len(band.offsets)
+    return (replace(profile, edge=profile.edge + move), seen.height,
+            np.sqrt(np.maximum(seen.misfit**2 - explained, 0.0)))

@@ -14,10 +14,11 @@ import numpy as np
 from cell.core.geometry import Array, Plane
 from cell.core.observation import Image
 from cell.metrology.arrays import Grey, Mask
+from cell.metrology.spread import middle
 
-BIN = 4                # lines along the stripe that are averaged before the search
+BIN, PAIR = 4, 2       # px along and across the stripe that are averaged before the search
 NARROW, WIDE = 2.0, 8.0  # px, the scales that a ridge stands out between
-COARSE = 4             # px across, that the ground is averaged over first
+COARSE = 2             # pairs that the ground is averaged over first
 MOST = 2               # ridges
 DRAWS = 300
 TOLERANCE = 2.5        # px, lens distortion over the length included
@@ -77,7 +78,7 @@ def find_ridges(image: Image, *, upright: bool) -> list[Ridge]:
 
     Behind a large hole a second sheet may show more of the laser than the first.
     """
-    turned = image if upright else np.ascontiguousarray(image.T)
+    turned = image if upright else cv2.transpose(image)
     response = _response(turned)
     u, line, height = _candidates(response)
     found: list[Ridge] = []
@@ -97,44 +98,44 @@ def _longest(response: Grey, u: Array, line: Array, height: Array) -> tuple[Mask
     if near.sum() < 2:
         return near, Ridge(0.0, 0.0, True, 0.0, 0.0, np.zeros(0))
     slope, offset = map(float, np.polyfit(v[near], u[near], 1))
-    usual = float(np.median(height[near]))
+    usual = middle(height[near])
     share = len(np.unique(line[near])) / len(response)
     return near, Ridge(offset, slope, True, share, usual, _along(response, offset, slope) / usual)
 
 
 def _response(turned: Image) -> Grey:
-    length, width = turned.shape
-    binned = cv2.resize(turned, (width, max(1, length // BIN)), interpolation=cv2.INTER_AREA)
-    lines = cv2.GaussianBlur(binned.astype(np.float32), (0, 0), sigmaX=NARROW, sigmaY=0.8)
-    coarse = cv2.resize(lines, (max(1, width // COARSE), len(lines)), interpolation=cv2.INTER_AREA)
-    ground = cv2.GaussianBlur(coarse, (15, 1), sigmaX=WIDE / COARSE)
-    return lines - cv2.resize(ground, (width, len(lines)), interpolation=cv2.INTER_LINEAR)
+    """Give how far each bin, BIN lines high and PAIR pixels wide, stands out of its ground."""
+    length, width = turned.shape[0] // BIN, turned.shape[1] // PAIR
+    whole = turned[:BIN * length, :PAIR * width]
+    half = cv2.resize(whole, (width, 2 * length), interpolation=cv2.INTER_AREA)
+    binned = cv2.addWeighted(half[::2], 0.5, half[1::2], 0.5, 0.0, dtype=cv2.CV_32F)
+    lines = cv2.GaussianBlur(binned, (0, 0), sigmaX=NARROW / PAIR, sigmaY=0.8)
+    coarse = cv2.resize(lines, (width // COARSE, length), interpolation=cv2.INTER_AREA)
+    ground = cv2.GaussianBlur(coarse, (15, 1), sigmaX=WIDE / (PAIR * COARSE))
+    return lines - cv2.resize(ground, (width, length), interpolation=cv2.INTER_LINEAR)
 
 
 def _along(response: Grey, offset: float, slope: float) -> Array:
     """Give the highest response near the line, for each line of the response."""
-    middle = offset + slope * (np.arange(len(response)) * BIN + (BIN - 1) / 2.0)
-    near = np.rint(middle).astype(np.intp)[:, None] + np.arange(-2, 3)
+    course = offset + slope * (np.arange(len(response)) * BIN + (BIN - 1) / 2.0)
+    near = np.rint((course - (PAIR - 1) / 2.0) / PAIR).astype(np.intp)[:, None] + np.arange(-1, 2)
     inside = np.clip(near, 0, response.shape[1] - 1)
     highest = np.take_along_axis(response, inside, axis=1).max(axis=1).astype(np.float64)
-    return np.where((near[:, 2] >= 0) & (near[:, 2] < response.shape[1]), highest, 0.0)
+    return np.where((near[:, 1] >= 0) & (near[:, 1] < response.shape[1]), highest, 0.0)
 
 
 def _candidates(response: Grey) -> tuple[Array, Array, Array]:
     """Give the two highest ridges of each line that stand out: u, line and height."""
-    unrest = 1.4826 * float(np.median(np.abs(response[::2, ::4]))) + 0.05
-    summit = ((response[:, 1:-1] > response[:, :-2]) & (response[:, 1:-1] >= response[:, 2:])
-              & (response[:, 1:-1] > SIGNIFICANCE * unrest))
-    heights = np.where(summit, response[:, 1:-1], np.float32(0.0))
-    line = np.arange(len(response))
-    first = heights.argmax(axis=1)
-    tops = heights[line, first]
-    heights[line, first] = 0.0
-    second = heights.argmax(axis=1)
-    height = np.concatenate([tops, heights[line, second]]).astype(np.float64)
-    column, line = np.concatenate([first, second]), np.concatenate([line, line])
-    real = height > 0.0
-    return column[real].astype(np.float64) + 1.0, line[real].astype(np.float64), height[real]
+    unrest = 1.4826 * middle(np.abs(response[::4, ::2]).ravel()) + 0.05
+    line, reach = np.arange(len(response)), int(WIDE) // PAIR
+    first = response.argmax(axis=1)
+    beside = np.clip(first[:, None] + np.arange(-reach, reach + 1), 0, response.shape[1] - 1)
+    rest = response.copy()
+    np.put_along_axis(rest, beside, 0.0, axis=1)
+    column, line = np.concatenate([first, rest.argmax(axis=1)]), np.concatenate([line, line])
+    height = response[line, column].astype(np.float64)
+    real = height > SIGNIFICANCE * unrest
+    return PAIR * column[real] + (PAIR - 1) / 2.0, line[real].astype(np.float64), height[real]
 
 
 def _straightest(u: Array, v: Array) -> Mask:
@@ -148,6 +149,6 @@ def _straightest(u: Array, v: Array) -> Mask:
     first, second = first[far], second[far]
     slope = (u[second] - u[first]) / (v[second] - v[first])
     offset = u[first] - slope * v[first]
-    miss = np.abs(offset[:, None] + slope[:, None] * v - u) / TOLERANCE
-    agreement = np.clip(1.0 - miss**2, 0.0, None).sum(axis=1) * (np.abs(slope) < 1.0)
-    return np.asarray(miss[int(np.argmax(agreement))] < 1.0)
+    square = (offset[:, None] + slope[:, None] * v - u) ** 2
+    miss = np.minimum(square, TOLERANCE**2).sum(axis=1) + np.where(np.abs(slope) < 1.0, 0.0, np.inf)
+    return np.asarray(square[int(np.argmin(miss))] < TOLERANCE**2)

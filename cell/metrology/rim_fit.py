@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from cell.core.geometry import Array
@@ -12,6 +14,7 @@ from cell.metrology.ellipse import Ellipse
 from cell.metrology.spread import robust_sigma, tukey_weights
 
 DRAWS = 256
+DAMPING = 1e-9
 GOLDEN = 0.6180339887498949
 
 
@@ -33,10 +36,10 @@ def agree(band: Band, edges: Edges, tolerance: float, *, free: int = 5) -> tuple
     design = _design(band, free)
     rows = design[edges.ray]
     picks = _draws(edges.ray, len(band.t), free)
-    solved = _solve(rows[picks], edges.offset[picks])
-    miss = np.abs(solved @ rows.T - edges.offset)
-    near = np.clip(1.0 - (miss / tolerance) ** 2, 0.0, None) @ np.ones(len(edges.offset))
-    winner = solved[int(np.argmax(near))]
+    drawn = rows[picks] + DAMPING * np.eye(free)  # an edge may be drawn twice
+    solved = np.linalg.solve(drawn, edges.offset[picks][..., None])[..., 0]
+    miss = np.minimum((solved @ rows.T - edges.offset) ** 2, tolerance**2)
+    winner = solved[int(np.argmin(miss.sum(axis=1)))]
     return _moved(band.ellipse, winner, free), np.abs(rows @ winner - edges.offset) < tolerance
 
 
@@ -65,11 +68,10 @@ def settle(band: Band, edges: Edges, *, floor: float,
 
 
 def _design(band: Band, free: int) -> Array:
-    full = band.ellipse.design(band.t)
     if free == 5:
-        return full
-    growth = full[:, 2:] @ band.ellipse.shape[[0, 0, 1], [0, 1, 1]] / band.ellipse.radius
-    return np.column_stack([full[:, :2], growth])
+        return band.design
+    growth = band.design[:, 2:] @ band.ellipse.shape[[0, 0, 1], [0, 1, 1]] / band.ellipse.radius
+    return np.column_stack([band.design[:, :2], growth])
 
 
 def _moved(ellipse: Ellipse, step: Array, free: int) -> Ellipse:
@@ -81,14 +83,18 @@ def _moved(ellipse: Ellipse, step: Array, free: int) -> Ellipse:
 
 def _draws(ray: Indices, rays: int, free: int) -> Indices:
     """Draw `free` edges (DRAWS, free), each from a sector of its own, the first anywhere."""
-    order, draw = np.argsort(ray, kind="stable"), np.arange(DRAWS)
-    turn = np.stack([draw * GOLDEN + (sector + np.mod(draw * np.sqrt(2.0 + 3 * sector), 1.0)) / free
-                     for sector in range(free)], axis=1)
-    picks = np.searchsorted(ray[order], rays * np.mod(turn, 1.0))
+    order = np.argsort(ray, kind="stable")
+    picks = np.searchsorted(ray[order], rays * _turns(free))
     return order[np.minimum(picks, len(ray) - 1)]
 
 
+@cache
+def _turns(free: int) -> Array:
+    draw, sector = np.arange(DRAWS)[:, None], np.arange(free)
+    within = np.mod(draw * np.sqrt(2.0 + 3 * sector), 1.0)
+    return np.asarray(np.mod(draw * GOLDEN + (sector + within) / free, 1.0))
+
+
 def _solve(rows: Array, offset: Array) -> Array:
-    across = rows.swapaxes(-1, -2)
-    damped: Array = across @ rows + 1e-9 * np.eye(rows.shape[-1])
-    return np.asarray(np.linalg.solve(damped, across @ offset[..., None])[..., 0])
+    damped = rows.T @ rows + DAMPING * np.eye(rows.shape[1])
+    return np.asarray(np.linalg.solve(damped, rows.T @ offset))

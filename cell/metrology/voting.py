@@ -14,8 +14,9 @@ import numpy as np
 from cell.core.geometry import Array
 from cell.core.observation import Image
 from cell.metrology.arrays import Grey, Indices
+from cell.metrology.spread import quantile
 
-VOTING_RADIUS = 14.0  # px that the smallest radius keeps in the reduced image
+VOTING_RADIUS = 10.0  # px that the smallest radius keeps at least in the reduced image
 EDGE_SHARE = 0.15     # of the pixels vote, those of the largest gradient
 SPREAD = 0.07         # of the radius, within which votes of a tilted circle meet
 
@@ -43,16 +44,24 @@ def vote_for_circles(image: Image, radii: Array, inside: int, count: int = 5) ->
         inside: -1 for holes darker than the metal, +1 for brighter ones.
         count: how many places to return.
     """
-    factor = max(1, round(radii[0] / VOTING_RADIUS))
-    small = cv2.resize(image, None, fx=1.0 / factor, fy=1.0 / factor, interpolation=cv2.INTER_AREA)
-    scale = np.array(image.shape, dtype=np.float64) / small.shape
+    small, factor = _reduced(image, radii[0])
     ballots = _ballots(small)
     layers = np.stack([_layer(ballots, r / factor, inside, small.shape) for r in radii])
     rows, columns = _peaks(layers.max(axis=0), radii[0] / factor, count)
     which = layers[:, rows, columns].argmax(axis=0)
-    return [Circle(float((x + 0.5) * scale[1] - 0.5), float((y + 0.5) * scale[0] - 0.5),
+    return [Circle(float((x + 0.5) * factor - 0.5), float((y + 0.5) * factor - 0.5),
                    float(radii[layer]), inside, float(layers[layer, y, x]))
             for layer, y, x in zip(which, rows, columns, strict=True)]
+
+
+def _reduced(image: Image, radius: float) -> tuple[Image, int]:
+    """Halve an image as often as a radius allows: the image, and its pixel in pixels of before."""
+    factor = 1
+    while radius >= 2 * factor * VOTING_RADIUS and min(image.shape) > 1:
+        whole = image[:image.shape[0] // 2 * 2, :image.shape[1] // 2 * 2]
+        image = cv2.resize(whole, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+        factor *= 2
+    return image, factor
 
 
 def _ballots(small: Image) -> tuple[Indices, Indices, Grey, Grey, Grey]:
@@ -60,10 +69,11 @@ def _ballots(small: Image) -> tuple[Indices, Indices, Grey, Grey, Grey]:
     smooth = cv2.GaussianBlur(small, (0, 0), 0.8).astype(np.float32)
     g_x, g_y = cv2.Sobel(smooth, cv2.CV_32F, 1, 0), cv2.Sobel(smooth, cv2.CV_32F, 0, 1)
     size = cv2.magnitude(g_x, g_y)
-    usual, strong = np.quantile(size[::2, ::2], [1.0 - EDGE_SHARE, 1.0 - EDGE_SHARE / 5.0])
-    y, x = np.nonzero(size > max(float(usual), 1e-3))
+    some = size[::2, ::2].ravel()
+    usual, strong = (quantile(some, 1.0 - share) for share in (EDGE_SHARE, EDGE_SHARE / 5.0))
+    y, x = np.nonzero(size > max(usual, 1e-3))
     length = size[y, x]
-    weight = np.minimum(length / max(float(strong), 1e-3), 1.0)
+    weight = np.minimum(length / max(strong, 1e-3), 1.0)
     return x, y, g_x[y, x] / length, g_y[y, x] / length, weight
 
 
