@@ -20,7 +20,7 @@ from cell.metrology.wall import Wall
 
 STEPS = 7
 SETTLED = 0.005       # px and shares: below, the fit has arrived
-FEW = 64              # rays tell which wall it is
+FEW = 100             # rays tell which wall it is
 THINNED = 2           # every second ray tells enough of blur and wall
 DARKEST, BRIGHTEST = -0.6, 1.3        # k
 NOTABLE_WALL = 1.5                    # px
@@ -88,15 +88,16 @@ def fit_profile(band: Band, rays: Mask, walls: list[Wall], *, doubled: bool = Tr
             if misfit < wall.worth * least:
                 best, least, chosen = state, misfit, wall
     thinned = band[used[::THINNED]]
-    best, _ = _descend(RimModel(thinned, chosen), thinned, best)
+    best, _ = _descend(RimModel(thinned, chosen), thinned, best, steps=1)
     return RimModel(band, chosen).read(best)
 
 
-def _descend(model: RimModel, band: Band, state: Array) -> tuple[Array, float]:
+def _descend(model: RimModel, band: Band, state: Array,
+             steps: int = STEPS) -> tuple[Array, float]:
     """Fit from a start (Gauss-Newton): the numbers, and the mean misfit of a ray in grey."""
     rows = model.rows()
     flat, misfit = rows.reshape(-1, len(state)), np.inf
-    for _ in range(STEPS):
+    for _ in range(steps):
         seen = compare(band.grey, shape_step(band.offsets, model.read(state)))
         misfit, scale = float(seen.misfit.mean()), max(middle(seen.misfit), 1e-3)
         weight = tukey_weights(np.maximum(seen.misfit - scale, 0.0), scale)

@@ -14,7 +14,6 @@ from cell.metrology.ellipse import Ellipse
 from cell.metrology.spread import robust_sigma, tukey_weights
 
 DRAWS = 256
-DAMPING = 1e-9
 GOLDEN = 0.6180339887498949
 
 
@@ -36,8 +35,7 @@ def agree(band: Band, edges: Edges, tolerance: float, *, free: int = 5) -> tuple
     design = _design(band, free)
     rows = design[edges.ray]
     picks = _draws(edges.ray, len(band.t), free)
-    drawn = rows[picks] + DAMPING * np.eye(free)  # an edge may be drawn twice
-    solved = np.linalg.solve(drawn, edges.offset[picks][..., None])[..., 0]
+    solved = _solve(rows[picks], edges.offset[picks])
     miss = np.minimum((solved @ rows.T - edges.offset) ** 2, tolerance**2)
     winner = solved[int(np.argmin(miss.sum(axis=1)))]
     return _moved(band.ellipse, winner, free), np.abs(rows @ winner - edges.offset) < tolerance
@@ -96,5 +94,6 @@ def _turns(free: int) -> Array:
 
 
 def _solve(rows: Array, offset: Array) -> Array:
-    damped = rows.T @ rows + DAMPING * np.eye(rows.shape[1])
-    return np.asarray(np.linalg.solve(damped, rows.T @ offset))
+    across = rows.swapaxes(-1, -2)
+    damped: Array = across @ rows + 1e-9 * np.eye(rows.shape[-1])
+    return np.asarray(np.linalg.solve(damped, across @ offset[..., None])[..., 0])
