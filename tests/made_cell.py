@@ -174,3 +174,13 @@ def _feature(hole, outcome):
     return Feature(hole.id, worst, outcome, hole.nominal, hole.tolerance,
                    {k: float(v) for k, v in values.items()}, deviation,
                    dict.fromkeys("xyzd", 0.01), verdicts)
+
+
+def once(error, body, hole):
+    """Plant one failure before one hole of one body."""
+    waiting = [error]
+
+    def plant(at_body, at_hole):
+        if (at_body, at_hole) == (body, hole) and waiting:
+            raise waiting.pop()
+    return plant

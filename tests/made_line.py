@@ -4,6 +4,12 @@ from dataclasses import dataclass
 
 from cell.core.ports import LineResult, LineStatus, Order
 
+STOP, RESET, ABORT = Order("stop"), Order("reset", operator="Meier"), Order("abort")
+
+
+def start(body, body_type=1, **changes):
+    return Order("start", body, body_type, **changes)
+
 
 @dataclass(frozen=True)
 class When:
