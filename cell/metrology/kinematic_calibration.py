@@ -21,7 +21,6 @@ from cell.metrology.hand_eye import RobotNoise
 from cell.metrology.motions import adjoint, inverse, nudge, small, stack
 
 ROWS = 24  # a and d (mm), alpha and theta (rad) of six joints
-STEP = 1e-6
 REPEATABILITY = RobotNoise(0.05, 0.005)  # of an arm of the UR10e class
 
 

@@ -49,23 +49,40 @@ def _mount(before: Calibrated, now: Calibrated) -> float | None:
         return None
     distance = now.sensor.working_distance
     volume = VOLUME + np.array([0.0, 0.0, distance])
-    moved = np.sqrt(np.mean(np.sum((one @ volume - other @ volume) ** 2, axis=1)))
+    moved = np.mean(np.sum((one @ volume - other @ volume) ** 2, axis=1))
     rows = volume_shift(other, distance)
-    sigma = np.sqrt(np.einsum("nij,jk,nik->", rows, covariance, rows) / len(VOLUME))
-    return float(moved / (EXPANDED * sigma))
+    by_mount = np.einsum("nij,jk,nik->", rows, covariance, rows) / len(VOLUME)
+    by_camera = np.trace(_by_camera(before.sensor, now.sensor))
+    return float(np.sqrt(moved / (by_mount + by_camera)) / EXPANDED)
 
 
 def _plane(before: Calibrated, now: Calibrated) -> float | None:
     """Hold the planes apart where the new one crosses the working volume."""
     one, other = before.sensor.light_plane, now.sensor.light_plane
     covariance = _sum(before.sensor.light_plane_covariance, now.sensor.light_plane_covariance)
-    points = VOLUME + np.array([0.0, 0.0, now.sensor.working_distance])
-    points = points - np.outer(other.distance(points), other.normal)
     if covariance is None:
         return None
+    points = VOLUME + np.array([0.0, 0.0, now.sensor.working_distance])
+    points = points - np.outer(other.distance(points), other.normal)
     rows = np.column_stack([points, np.ones(len(points))])
-    variance = np.einsum("ni,ij,nj->n", rows, covariance, rows)
-    return float(np.sqrt(np.mean(one.distance(points) ** 2) / np.mean(variance)) / EXPANDED)
+    by_plane = np.mean(np.einsum("ni,ij,nj->n", rows, covariance, rows))
+    by_camera = other.normal @ _by_camera(before.sensor, now.sensor) @ other.normal
+    return float(np.sqrt(np.mean(one.distance(points) ** 2) / (by_plane + by_camera)) / EXPANDED)
+
+
+def _by_camera(before: SensorModel, now: SensorModel) -> Array:
+    """Form the covariance (3, 3) mm² of where a board seems to stand, by that of both cameras.
+
+    With another focal length it seems to stand at another distance, with another principal point
+    aside; light plane and mount were found with it, and go along.
+    """
+    covariance = _sum(before.camera_covariance, now.camera_covariance)
+    if covariance is None:
+        return np.zeros((3, 3))
+    moved = np.zeros((3, 4))
+    moved[2, 0], moved[0, 2], moved[1, 3] = 1.0, -1.0, -1.0
+    moved *= now.working_distance / now.camera.matrix[0, 0]
+    return np.asarray(moved @ covariance[:4, :4] @ moved.T)
 
 
 def _focal(before: Calibrated, now: Calibrated) -> float | None:

@@ -12,19 +12,26 @@ from cell.metrology.calibration_gates import Checked, Ruling
 from cell.metrology.camera_calibration import CameraResult
 from cell.metrology.hand_eye_calibration import HandEyeAnswer
 from cell.metrology.light_plane import LightPlaneResult
+from cell.metrology.sphere import SphereResult
 from cell.report.calibration_pictures import (
+    draw_before_and_after,
     draw_board_points,
     draw_coverage,
     draw_ellipsoid,
     draw_plane,
     draw_residuals,
+    draw_sphere,
     draw_tilt_and_roll,
 )
 
 
 @dataclass(frozen=True, eq=False)
 class CalibrationPage:
-    """What the report is made of: `pixels` are the corners of all views, for the coverage map."""
+    """What the report is made of.
+
+    `pixels` are the corners of all views, for the coverage map; `stillness` tells how still (mm,
+    rms) the board stands in the views `numbers`, by the set before and by this one.
+    """
 
     facts: Mapping[str, str]
     verdict: Ruling
@@ -35,6 +42,9 @@ class CalibrationPage:
     hand_eye: HandEyeAnswer | None
     pixels: Sequence[Array]
     image_size: tuple[int, int]
+    sphere: SphereResult | None = None
+    numbers: Sequence[int] = ()
+    stillness: tuple[Array, Array] | None = None
 
 
 @dataclass(frozen=True)
@@ -60,10 +70,18 @@ def draw_pictures(page: CalibrationPage) -> list[Picture]:
                         "not calibrated.", draw_coverage(page.pixels, page.image_size))]
     if page.light_plane is not None:
         pictures.append(Picture("Light plane", "How far the stripe's points are from the plane, "
-                                "over the distance from the camera; one colour a pose.",
+                                "pose by pose: box and line are the middle half and the median.",
                                 draw_plane(page.light_plane)))
     if page.hand_eye is not None and page.hand_eye.held_out is not None:
         pictures += _of_hand_eye(page.hand_eye)
+    if page.sphere is not None:
+        pictures.append(Picture("Sphere", "Where each pose alone would have the centre, against "
+                                "all together, and how far its points lie outside: laser, camera, "
+                                "hand-eye and arm together.", draw_sphere(page.sphere)))
+    if page.stillness is not None:
+        pictures.append(Picture("Before and after", "How still the board stands in every view, by "
+                                "the set that was active and by this one.",
+                                draw_before_and_after(*page.stillness, page.numbers)))
     return pictures
 
 

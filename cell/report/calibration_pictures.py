@@ -16,6 +16,7 @@ from cell.metrology.hand_eye import HandEyeProblem, HandEyeResult
 from cell.metrology.hand_eye_calibration import HandEyeAnswer
 from cell.metrology.light_plane import LightPlaneResult
 from cell.metrology.motions import lay_onto, point_shift
+from cell.metrology.sphere import SphereResult
 
 INK, MUTED, ACCENT = "#1b2a41", "#8d99ae", "#d1495b"
 LARGER = 100.0  # by which distances of the board points are drawn larger
@@ -97,6 +98,40 @@ def draw_ellipsoid(answer: HandEyeAnswer) -> str:
     figure = Figure(figsize=(7.2, 2.6), layout="constrained")
     for place, (a, b) in enumerate(((0, 1), (0, 2), (1, 2))):
         _ellipse(figure.add_subplot(1, 3, place + 1), spread, a, b)
+    return _png(figure)
+
+
+def draw_sphere(result: SphereResult) -> str:
+    """Draw where each pose alone would have the sphere, and how far its points are off it."""
+    figure = Figure(figsize=(7.2, 3.2), layout="constrained")
+    shifts = 1000.0 * result.shifts
+    for place, (a, b) in enumerate(((0, 1), (0, 2))):
+        axes = figure.add_subplot(1, 3, place + 1)
+        axes.axhline(0.0, color=MUTED, linewidth=0.8)
+        axes.axvline(0.0, color=MUTED, linewidth=0.8)
+        axes.plot(shifts[:, a], shifts[:, b], "o", color=INK, markersize=5)
+        for pose, at in enumerate(shifts[:, [a, b]], start=1):
+            axes.annotate(str(pose), at, xytext=(4, 3), textcoords="offset points", fontsize=7)
+        reach = 1.2 * float(np.abs(shifts).max())
+        axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal",
+                 xlabel=f"{'xyz'[a]} (µm)", ylabel=f"{'xyz'[b]} (µm)")
+        axes.grid(alpha=0.3)
+    axes = figure.add_subplot(1, 3, 3)
+    axes.axhline(0.0, color=MUTED, linewidth=0.8)
+    axes.boxplot([1000.0 * some for some in result.residuals], showfliers=False,
+                 medianprops={"color": ACCENT})
+    axes.set(xlabel="pose", ylabel="outside of the sphere (µm)")
+    return _png(figure)
+
+
+def draw_before_and_after(before: Array, after: Array, numbers: Sequence[int]) -> str:
+    """Draw how still the board stands (mm) in every view, by the set before and by this one."""
+    figure, axes = _new("view", "board missed by (mm rms)")
+    places = np.arange(len(numbers))
+    axes.bar(places - 0.2, before, 0.4, color=MUTED, label="by the set before")
+    axes.bar(places + 0.2, after, 0.4, color=INK, label="by this set")
+    axes.set_xticks(places, [str(number) for number in numbers], fontsize=7)
+    axes.legend(frameon=False, fontsize=8)
     return _png(figure)
 
 

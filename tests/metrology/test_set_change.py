@@ -21,15 +21,17 @@ BEFORE = Calibrated(SENSOR, MOUNTED, MOUNT)
 
 
 def drawn(rng):
-    """The same sensor calibrated once more."""
-    plane = SENSOR.light_plane
-    matrix = SMALL.matrix.copy()
-    matrix[0, 0] += rng.normal(0.0, 0.5)
+    """The same sensor calibrated once more: plane and mount go along with the camera."""
+    plane, off = SENSOR.light_plane, rng.normal(0.0, np.sqrt(np.diag(FOCAL)))
+    matrix = SMALL.matrix + np.array([[off[0], 0, off[2]], [0, off[1], off[3]], [0, 0, 0]])
+    seems = SENSOR.working_distance / 1620.0 * np.array([-off[2], -off[3], off[0]])
     step = rng.normal(0.0, [1e-5, 1e-5, 1e-5, 3e-3])
-    moved = Plane.from_coefficients((*(plane.normal + step[:3]), plane.offset + step[3]))
+    moved = Plane.from_coefficients((*(plane.normal + step[:3]),
+                                     plane.offset + step[3] - plane.normal @ seems))
+    mount = nudge(MOUNTED, rng.normal(0.0, np.sqrt(np.diag(MOUNT))))
     return Calibrated(SensorModel(CameraModel(SMALL.image_size, matrix, SMALL.distortion), moved,
                                   FOCAL, PLANE),
-                      nudge(MOUNTED, rng.normal(0.0, np.sqrt(np.diag(MOUNT)))), MOUNT)
+                      mount @ Transform.from_parts(np.zeros(3), -seems), MOUNT)
 
 
 def test_the_same_set_has_not_changed():
@@ -47,11 +49,11 @@ def test_what_was_only_measured_again_passes():
 
 @pytest.mark.parametrize(("name", "changed"), [
     ("hand_eye", replace(BEFORE, flange_from_camera=MOUNTED @ Transform.from_parts(
-        np.zeros(3), [0.3, -0.2, 0.1]))),
+        np.zeros(3), [0.9, -0.6, 0.3]))),
     ("hand_eye", replace(BEFORE, flange_from_camera=MOUNTED @ Transform.from_parts(
-        np.radians([0.12, 0.0, 0.0]), np.zeros(3)))),
+        np.radians([0.3, 0.0, 0.0]), np.zeros(3)))),
     ("light_plane", replace(BEFORE, sensor=replace(SENSOR, light_plane=Plane.from_coefficients(
-        (0.8, 0.05, 0.6, -150.05))))),
+        (0.8, 0.05, 0.6, -151.0))))),
     ("focal", replace(BEFORE, sensor=replace(SENSOR, camera=CameraModel(
         SMALL.image_size, SMALL.matrix + np.diag([4.0, 4.0, 0.0]), SMALL.distortion)))),
 ])

@@ -17,6 +17,7 @@ from cell.programs.calibration.belief import Belief
 from cell.programs.calibration.capture import as_rows
 from cell.programs.calibration.session import Session
 from cell.programs.calibration.solve import Solution, chain_of
+from cell.programs.calibration.stillness import before_and_after
 from cell.report.calibration import CalibrationPage, calibration_report
 
 
@@ -43,11 +44,12 @@ def make_set(session: Session, solution: Solution, belief: Belief, signature: Si
     if (kinematics := chain_of(solution, belief).kinematics) is not None:
         replace_text(made / "kinematics.yaml", dump(kinematics))
     replace_text(made / "report.html", calibration_report(page_of(solution, session.header,
-                                                                  signature)))
+                                                                  belief, signature)))
     return write_set(belief.folder, made, signature.at)
 
 
-def page_of(solution: Solution, header: SessionHeader, signature: Signature) -> CalibrationPage:
+def page_of(solution: Solution, header: SessionHeader, belief: Belief,
+            signature: Signature) -> CalibrationPage:
     """Gather what the report shows."""
     facts = {"cell": header.cell, "what": header.what, "begun": header.begun,
              "operator": signature.by, "accepted because": signature.reason or "-",
@@ -60,7 +62,9 @@ def page_of(solution: Solution, header: SessionHeader, signature: Signature) -> 
     return CalibrationPage(facts, solution.verdict, solution.reasons, solution.gates,
                            solution.camera_result, solution.light_plane, solution.hand_eye,
                            tuple(view.board.pixels for view in solution.views),
-                           solution.camera.image_size)
+                           solution.camera.image_size, solution.sphere,
+                           [view.record.number for view in solution.views],
+                           before_and_after(solution, belief))
 
 
 def sensor_document(solution: Solution, belief: Belief) -> SensorDocument:
