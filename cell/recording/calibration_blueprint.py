@@ -12,6 +12,7 @@ from cell.recording.layout import CAMERA
 
 WORLD, NOW, COVERAGE, LEANS = "/cell", "/now", "/coverage", "/leans"
 PREDICTED, GOAL, FIGURES = "/uncertainty", "/uncertainty/goal", "/figures"
+RESULTS = "/results"
 NEAR = 0.85        # distance of the eye, in extents of what is looked at
 IN_FRONT = 250.0   # mm
 LEAN_SHOWN = 40.0  # degrees, each way
@@ -20,8 +21,9 @@ DARK = [24, 26, 30]
 
 def build_calibration_blueprint(moment: CalibrationMoment) -> rrb.Blueprint:
     """Lay out the views for a session, as far as it is known what there is to look at."""
+    seen = rrb.Tabs(_results(moment), _seen(moment)) if moment.results else _seen(moment)
     return rrb.Blueprint(
-        rrb.Horizontal(_seen(moment), _said(moment), column_shares=[5, 4]),
+        rrb.Horizontal(seen, _said(moment), column_shares=[5, 4]),
         rrb.BlueprintPanel(state="hidden"), rrb.SelectionPanel(state="hidden"),
         rrb.TimePanel(state="collapsed", timeline="look", play_state="following"),
         auto_layout=False, auto_views=False)
@@ -39,7 +41,13 @@ def _seen(moment: CalibrationMoment) -> rrb.Vertical:
             origin="/", contents=[f"{WORLD}/**", CAMERA, RING],
             name="views: grey planned, blue kept apart, yellow next, green taken",
             eye_controls=_eye(moment), background=DARK, line_grid=rrb.LineGrid3D(visible=False)),
-        row_shares=[2, 3])
+        row_shares=[2, 3], name="views")
+
+
+def _results(moment: CalibrationMoment) -> rrb.Grid:
+    return rrb.Grid(*[rrb.Spatial2DView(origin=f"{RESULTS}/{number}", name=title)
+                      for number, (title, _) in enumerate(moment.results)],
+                    grid_columns=2, name="result")
 
 
 def _said(moment: CalibrationMoment) -> rrb.Vertical:

@@ -68,6 +68,7 @@ class CalibrationMoment:
         figures: what is drawn over time, by name.
         predicted: the uncertainty (mm) that the views so far allow, NaN where there is none.
         goal: to which it is to fall, NaN where there is none.
+        results: the pictures of the report, title and PNG, once there is a solution.
     """
 
     session: str
@@ -88,8 +89,9 @@ class CalibrationMoment:
     figures: tuple[tuple[str, float], ...] = ()
     predicted: float = float("nan")
     goal: float = float("nan")
+    results: tuple[tuple[str, bytes], ...] = ()
 
     @property
-    def extent(self) -> tuple[int, int]:
-        """How much there is to look at in space: boards, and views of a plan."""
-        return len(self.boards), len(self.planned)
+    def extent(self) -> tuple[int, ...]:
+        """How much there is to look at: boards, views of a plan, pictures of the result."""
+        return len(self.boards), len(self.planned), len(self.results)

@@ -20,6 +20,7 @@ from cell.recording.calibration_blueprint import (
     LEANS,
     NOW,
     PREDICTED,
+    RESULTS,
     WORLD,
     build_calibration_blueprint,
 )
@@ -95,6 +96,8 @@ def _draw(moment: CalibrationMoment) -> Iterator[Drawing]:
     if not np.isnan(moment.goal):
         yield PREDICTED, rr.Scalars([moment.predicted])
         yield GOAL, rr.Scalars([moment.goal])
+    for number, (_, png) in enumerate(moment.results):
+        yield f"{RESULTS}/{number}", rr.EncodedImage(contents=png, media_type="image/png")
     for name, value in moment.figures:
         yield f"{FIGURES}/{name.partition(' ')[0]}", rr.Scalars([value]), rr.SeriesLines(
             names=[name])

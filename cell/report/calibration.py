@@ -49,11 +49,15 @@ class CalibrationPage:
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture as the page shows it: its title, what it says, and the PNG in base 64."""
+    """A picture as the page shows it: its title, what it says, and the PNG in base 64.
+
+    A `wide` one has the whole width of the page.
+    """
 
     title: str
     says: str
     png: str
+    wide: bool = False
 
 
 def calibration_report(page: CalibrationPage) -> str:
@@ -65,7 +69,7 @@ def calibration_report(page: CalibrationPage) -> str:
 
 
 def draw_pictures(page: CalibrationPage) -> list[Picture]:
-    """Draw all pictures that the results allow."""
+    """Draw all pictures that the results allow, the wide ones last."""
     pictures = [Picture("Coverage of the image", "Every corner of every view; empty regions are "
                         "not calibrated.", draw_coverage(page.pixels, page.image_size))]
     if page.light_plane is not None:
@@ -74,15 +78,15 @@ def draw_pictures(page: CalibrationPage) -> list[Picture]:
                                 draw_plane(page.light_plane)))
     if page.hand_eye is not None and page.hand_eye.held_out is not None:
         pictures += _of_hand_eye(page.hand_eye)
-    if page.sphere is not None:
-        pictures.append(Picture("Sphere", "Where each pose alone would have the centre, against "
-                                "all together, and how far its points lie outside: laser, camera, "
-                                "hand-eye and arm together.", draw_sphere(page.sphere)))
     if page.stillness is not None:
         pictures.append(Picture("Before and after", "How still the board stands in every view, by "
                                 "the set that was active and by this one.",
                                 draw_before_and_after(*page.stillness, page.numbers)))
-    return pictures
+    if page.sphere is not None:
+        pictures.append(Picture("Sphere", "Where each pose alone would have the centre, against "
+                                "all together, and how far its points lie outside: laser, camera, "
+                                "hand-eye and arm together.", draw_sphere(page.sphere), wide=True))
+    return sorted(pictures, key=lambda picture: picture.wide)
 
 
 def _of_hand_eye(answer: HandEyeAnswer) -> list[Picture]:
@@ -91,9 +95,10 @@ def _of_hand_eye(answer: HandEyeAnswer) -> list[Picture]:
                 "board. A wide spread makes a good hand-eye.", draw_tilt_and_roll(answer)),
         Picture("Residuals", "How far the board is missed in each view; hollow bars were kept out "
                 "of the fit.", draw_residuals(answer)),
-        Picture("The board in all views", "Where each view puts the corners of the board, the "
-                "distance from their mean drawn 100 times larger.", draw_board_points(answer)),
+        Picture("The board in all views", "Where each view puts the corners of the board; what "
+                "a whole view is off by is pose, what one corner is off by is picture.",
+                draw_board_points(answer)),
         Picture("Uncertainty at the working distance", "Where a point on the optic axis may truly "
-                "be (one standard deviation), from the fit and as its views predict.",
-                draw_ellipsoid(answer)),
+                "be, from the covariance of the fit: the ellipsoid of one standard deviation.",
+                draw_ellipsoid(answer), wide=True),
     ]

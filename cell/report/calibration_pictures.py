@@ -19,8 +19,9 @@ from cell.metrology.motions import lay_onto, point_shift
 from cell.metrology.sphere import SphereResult
 
 INK, MUTED, ACCENT = "#1b2a41", "#8d99ae", "#d1495b"
-LARGER = 100.0  # by which distances of the board points are drawn larger
+LARGER = (1, 2, 5, 10, 20, 50, 100, 200, 500)  # by which board points may be drawn apart
 GRID = 8
+WIDE = (11.0, 3.4)  # inches: three plots in a row
 
 
 def draw_coverage(pixels: Sequence[Array], image_size: tuple[int, int]) -> str:
@@ -53,7 +54,8 @@ def draw_tilt_and_roll(answer: HandEyeAnswer) -> str:
     rolls = np.degrees(2.0 * np.arctan2(quaternions[:, 2], quaternions[:, 3]))
     figure, axes = _new("lean about y (degrees)", "lean about x (degrees)", equal=True)
     drawn = axes.scatter(np.degrees(np.arcsin(normals[:, 0])), np.degrees(np.arcsin(normals[:, 1])),
-                         c=(rolls + 180.0) % 360.0 - 180.0, cmap="twilight", s=36)
+                         c=(rolls + 180.0) % 360.0 - 180.0, cmap="twilight", s=44,
+                         vmin=-180.0, vmax=180.0, edgecolors=INK, linewidths=0.6)
     figure.colorbar(drawn, label="roll against the first view (degrees)")
     return _png(figure)
 
@@ -79,13 +81,25 @@ def draw_board_points(answer: HandEyeAnswer) -> str:
     points = np.concatenate([view.board.points_in_board for view in problem.views])
     mean = lay_onto(points, np.concatenate(carried))
     figure, axes = _new("x on the board (mm)", "y on the board (mm)", equal=True)
-    for some, view in zip(carried, problem.views, strict=True):
-        at = view.board.points_in_board
-        off = at + LARGER * (mean.inverse @ some - at)
+    shifts = [mean.inverse @ some - view.board.points_in_board
+              for some, view in zip(carried, problem.views, strict=True)]
+    larger = _larger(points, np.concatenate(shifts))
+    for shift, view in zip(shifts, problem.views, strict=True):
+        off = view.board.points_in_board + larger * shift
         axes.plot(off[:, 0], off[:, 1], ".", markersize=2.5)
     axes.plot(points[:, 0], points[:, 1], "+", color=INK, markersize=4)
-    axes.set_title(f"distances {LARGER:g} times larger", fontsize=9)
+    axes.set_title(f"distances from the mean (+) {larger:g} times larger; one colour a view",
+                   fontsize=9)
     return _png(figure)
+
+
+def _larger(points: Array, shifts: Array) -> float:
+    """Choose how much larger shifts (n, 3) can be drawn without running into the next corner."""
+    corners = np.unique(points.round(3), axis=0)
+    gaps = np.linalg.norm(corners[:, None] - corners[None], axis=2)
+    room = 0.5 * float(gaps[gaps > 0.0].min())
+    widest = float(np.quantile(np.linalg.norm(shifts[:, :2], axis=1), 0.95))
+    return float(max((factor for factor in LARGER if factor * widest < room), default=LARGER[0]))
 
 
 def draw_ellipsoid(answer: HandEyeAnswer) -> str:
@@ -95,7 +109,7 @@ def draw_ellipsoid(answer: HandEyeAnswer) -> str:
     jacobian = point_shift(result.carrier_from_camera.turn(point))[0]
     turn = result.carrier_from_camera.rotation
     spread = turn.T @ jacobian @ result.covariance[:6, :6] @ jacobian.T @ turn
-    figure = Figure(figsize=(7.2, 2.6), layout="constrained")
+    figure = Figure(figsize=WIDE, layout="constrained")
     for place, (a, b) in enumerate(((0, 1), (0, 2), (1, 2))):
         _ellipse(figure.add_subplot(1, 3, place + 1), spread, a, b)
     return _png(figure)
@@ -103,7 +117,7 @@ def draw_ellipsoid(answer: HandEyeAnswer) -> str:
 
 def draw_sphere(result: SphereResult) -> str:
     """Draw where each pose alone would have the sphere, and how far its points are off it."""
-    figure = Figure(figsize=(7.2, 3.2), layout="constrained")
+    figure = Figure(figsize=WIDE, layout="constrained")
     shifts = 1000.0 * result.shifts
     for place, (a, b) in enumerate(((0, 1), (0, 2))):
         axes = figure.add_subplot(1, 3, place + 1)
@@ -140,8 +154,11 @@ def _ellipse(axes: Axes, spread: Array, a: int, b: int) -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, 100)
     circle = np.stack([np.cos(angle), np.sin(angle)])
     x, y = 1000.0 * vectors @ (np.sqrt(np.maximum(values, 0.0))[:, None] * circle)
+    axes.fill(x, y, facecolor=ACCENT, alpha=0.15)
     axes.plot(x, y, color=ACCENT)
-    axes.set_aspect("equal", adjustable="datalim")
+    axes.plot(0.0, 0.0, "+", color=INK)
+    reach = 1300.0 * float(np.sqrt(np.diag(spread).max()))
+    axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
     axes.set_xlabel(f"{'xyz'[a]} of the camera (µm)")
     axes.set_ylabel(f"{'xyz'[b]} of the camera (µm)")
     axes.grid(alpha=0.3)

@@ -21,6 +21,7 @@ from cell.programs.calibration.belief import read_belief
 from cell.programs.calibration.session import Session
 from cell.programs.calibration.shown import Shown
 from cell.programs.calibration.solve import solve_session
+from cell.programs.calibration.stillness import before_and_after
 from cell.programs.calibration.wizard import Request, conclude, run_wizard
 
 ROOT = Path(__file__).parents[2]
@@ -113,6 +114,10 @@ def test_the_set_is_better_than_what_it_began_with(plant, finished):
     assert done.solution.verdict in ("pass", "warn") and done.active
     assert active_set(folder) == done.set_id
     assert chain_error(folder, done.set_id) < 0.12 < chain_error(folder, "2026-11-20a")
+    before, after = before_and_after(done.solution, read_belief(ROOT / "calibration", "demo"))
+    assert np.median(after) < 0.6 * np.median(before)
+    assert [gate.name for gate in done.solution.gates["last set"]] == [
+        "hand_eye", "light_plane", "focal"]
     assert [line.set for line in history(folder)] == ["2026-11-20a", done.set_id]
 
 
@@ -121,7 +126,10 @@ def test_the_set_is_whole_and_carries_its_evidence(plant, finished):
     home = plant / "demo" / "sets" / done.set_id
     check_set(home)
     report = read_text(home / "report.html")
-    assert report.count("data:image/png;base64") == 6 and "Uncertainty" in report
+    for title in ("Coverage of the image", "Light plane", "Tilt and roll", "Residuals", "The board "
+                  "in all views", "Before and after", "Uncertainty at the", "Sphere"):
+        assert f"<strong>{title}" in report
+    assert report.count("data:image/png;base64") == 8
     assert len(list((home / "images").glob("*.png"))) >= 30
     document = parse(HandEyeDocument, read_text(home / "hand_eye.yaml"), "hand_eye")
     assert document.robot.kinematics_checksum and document.covariance is not None

@@ -4,6 +4,7 @@ import signal
 import time
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 import rerun as rr
@@ -60,6 +61,15 @@ def test_a_moment_shows_what_was_found_and_how_far_it_has_come(tmp_path, moment)
     assert drawn(tmp_path / "a.rrd", "/uncertainty/goal", "Scalars:scalars")[-1] == [0.06]
     labels = drawn(tmp_path / "a.rrd", "/cell/numbers", "Points3D:labels")[-1]
     assert labels == ["1", "2"]
+
+
+def test_the_pictures_of_the_report_are_shown_with_the_verdict(tmp_path, moment):
+    _, png = cv2.imencode(".png", IMAGE)
+    results = (("Sphere", png.tobytes()), ("Residuals", png.tobytes()))
+    draw(tmp_path / "a.rrd", moment, replace(moment, results=results))
+    for number in (0, 1):
+        shown, = drawn(tmp_path / "a.rrd", f"/results/{number}", "EncodedImage:blob")[-1]
+        assert bytes(shown) == png.tobytes()
 
 
 def test_the_panel_says_first_what_is_missing(moment):

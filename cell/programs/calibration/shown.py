@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from base64 import b64decode
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -29,6 +30,7 @@ from cell.recording.calibration_moment import (
     no_pixels,
 )
 from cell.recording.live import LiveView
+from cell.report.calibration import CalibrationPage, draw_pictures
 
 
 class Shown:
@@ -95,10 +97,15 @@ class Shown:
         """Show that a view is left out."""
         self._show(planned=self._with_state(number, "left out"))
 
-    def concluded(self, verdict: str, gates: Sequence[Checked], reasons: Sequence[str]) -> None:
-        """Show what came of it."""
-        self._show(step=f"verdict: {verdict}", advice=" ".join(reasons) or "Nothing speaks against "
-                   "it.", lines=tuple(map(_as_line, gates)))
+    def concluded(self, page: CalibrationPage) -> None:
+        """Show what came of it, with the pictures of the report."""
+        if self._live is None:
+            return
+        gates = [gate for gates in page.gates.values() for gate in gates]
+        self._show(step=f"verdict: {page.verdict}", lines=tuple(map(_as_line, gates)),
+                   advice=" ".join(page.reasons) or "Nothing speaks against it.",
+                   results=tuple((picture.title, b64decode(picture.png))
+                                 for picture in draw_pictures(page)))
 
     def _show(self, **changes: Any) -> None:  # noqa: ANN401  the fields of a moment
         if self._live is not None:

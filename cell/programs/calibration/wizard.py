@@ -5,7 +5,7 @@ moves that was not shown and agreed to.
 from __future__ import annotations
 
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from cell.programs.calibration.belief import Belief, read_belief
 from cell.programs.calibration.capture import drive
 from cell.programs.calibration.gathering import Gathering
 from cell.programs.calibration.last_set import with_last_set
-from cell.programs.calibration.make_set import Signature, make_set
+from cell.programs.calibration.make_set import Signature, make_set, page_of
 from cell.programs.calibration.opening import Opening
 from cell.programs.calibration.poses import free_path
 from cell.programs.calibration.session import Session
@@ -81,14 +81,13 @@ def conclude(session: Session, belief: Belief, operator: Operator, shown: Shown)
     shown.step("solving")
     solution = with_last_set(solve_session(session, belief), belief, session.header.plan.gates)
     show(solution, operator)
-    shown.concluded(solution.verdict, [gate for gates in solution.gates.values() for gate in gates],
-                    solution.reasons)
+    signature = Signature(session.header.plan.operator, _now("%Y-%m-%dT%H%MZ"))
+    shown.concluded(page_of(solution, session.header, belief, signature))
     reason = _accepted(solution, session.header, operator)
     session.conclude(f"{solution.verdict}{'' if reason is None else ', accepted'}")
     if reason is None or session.header.what == "camera":
         return Finished(session.folder, solution, None, active=False)
-    signature = Signature(session.header.plan.operator, _now("%Y-%m-%dT%H%MZ"), reason)
-    set_id = make_set(session, solution, belief, signature)
+    set_id = make_set(session, solution, belief, replace(signature, reason=reason))
     operator.tell(f"set {set_id} made: {belief.folder / 'sets' / set_id / 'report.html'}")
     if not (session.header.plan.activate and operator.confirm(f"Activate {set_id}?")):
         return Finished(session.folder, solution, set_id, active=False)
