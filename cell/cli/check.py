@@ -70,6 +70,7 @@ def _describe(checked: CheckedJob) -> dict[str, Any]:
             "stops": [_describe_stop(stop) for stop in checked.stops],
             "refusals": [{"stop": stop, "reason": reason}
                          for stop, reason in checked.plan.refusals],
+            "not_visited": list(checked.not_visited),
             "stale_offsets": dict(checked.stale_offsets)}
 
 
@@ -90,9 +91,12 @@ def _show(checked: CheckedJob) -> None:
                                     f"calibration set {papers.set_id}")
     for row in checked.stops:
         table.add_row(row.stop.hole.id, "taught" if row.stop.taught else "computed",
-                      f"{row.clearance:.0f}", row.obstacle, f"{row.singularity_deg:.0f}",
-                      f"{row.limit_deg:.0f}", f"{row.seconds:.1f}")
+                      f"{row.clearance:.0f}" if row.obstacle else "·", row.obstacle,
+                      f"{row.singularity_deg:.0f}", f"{row.limit_deg:.0f}", f"{row.seconds:.1f}")
     answers.print(table)
+    if checked.not_visited:
+        console.print("[yellow]no stop for:[/yellow] " + ", ".join(checked.not_visited),
+                      highlight=False, soft_wrap=True)
     for offset, reason in checked.stale_offsets.items():
         console.print(f"[yellow]the CMM offset of {offset} will not be applied:[/yellow] {reason}")
     for stop, reason in refusals:

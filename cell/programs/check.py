@@ -47,6 +47,12 @@ class CheckedJob:
     stale_offsets: Mapping[str, str]
     seconds: float
 
+    @property
+    def not_visited(self) -> tuple[str, ...]:
+        """Holes of the nominals for which the job has no stop: nobody measures or judges them."""
+        visited = {stop.hole for stop in self.papers.job.stops}
+        return tuple(hole.id for hole in self.papers.holes if visited and hole.id not in visited)
+
 
 def check_job(job: Path, cell: str | None = None, logs: Path = Path("logs")) -> CheckedJob:
     """Check documents, the folder of recordings, every stop and the whole way.

@@ -16,7 +16,7 @@ from cell.core.geometry import Array
 COLOURS = {"in_tolerance": "#2a9d5c", "out_of_tolerance": "#d1343c", "uncertain": "#d9901a",
            "not_measured": "#7a7f87"}
 SIDES = (("x", "y", "from above"), ("x", "z", "from the side"), ("y", "z", "from the front"))
-ARROW_SHARE = 0.1  # of the picture's width, for a typical arrow
+ARROW_SHARE = 0.13  # of the picture's width, for a typical arrow
 TYPICAL, CAP = 80, 2.0  # percentile that sets the scale; longer arrows are cut at CAP times it
 KEYS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)  # mm, of the arrow that shows the scale
 

@@ -126,3 +126,10 @@ def test_recordings_that_could_not_be_written_are_found_before(cell, workplace):
     code, _, err = cell("check", "jobs/demo.yaml")
     assert code == 2
     assert "expected a folder" in err
+
+
+def test_a_hole_without_a_stop_is_named(cell, workplace):
+    workplace.replace(workplace.job, "  - {hole: BP1}\n", "")
+    code, _, err = cell("check", workplace.job)
+    assert code == 0
+    assert "no stop for: BP1\n" in err

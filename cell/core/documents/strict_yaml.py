@@ -128,6 +128,10 @@ def _line(event: yaml.Event) -> int:
 def _not_yaml(error: yaml.YAMLError, text: str, source: str) -> DocumentError:
     mark = getattr(error, "problem_mark", None)
     problem = getattr(error, "problem", None) or getattr(error, "reason", None) or "not readable"
+    if isinstance(error, yaml.reader.ReaderError):
+        before = text.split(chr(error.character))[0]
+        return DocumentError(f"not valid YAML: {problem}", source=source,
+                             place=f"line {before.count(chr(10)) + 1}")
     if mark is None:
         return DocumentError(f"not valid YAML: {problem}", source=source)
     line = text.splitlines()[mark.line:mark.line + 1]

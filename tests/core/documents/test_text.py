@@ -57,7 +57,7 @@ def refusal(text: str) -> str:
     (JOB + "stops: " + "[" * 5000, ["line 4", "levels deep"]),
     (JOB + "stand_off_mm: 1" + "0" * 6000 + "\n", ["line 4", "digits"]),
     (JOB + "? [a, b]\n: 1\n", ["line 4", "a key is a word"]),
-    ("name: \x00\n", ["not valid YAML"]),
+    ("a: ä\nname: \x00\n", ["line 2", "not valid YAML"]),
     ("x" * 1_000_001, ["1000001 characters"]),
 ])
 @pytest.mark.parametrize("loader", [yaml.SafeLoader, strict_yaml.LOADER])
