@@ -12,7 +12,7 @@ from cell.core.geometry import Array
 from cell.core.optics import CameraModel
 from cell.metrology.board_pose import BoardPose, BoardView
 from cell.metrology.calibration_gates import Checked, Gate, GateSet, check_gates
-from cell.metrology.camera_calibration import TILTED, coverage
+from cell.metrology.camera_calibration import TILTED, CameraResult, solve_camera
 from cell.metrology.diversity import measure_diversity
 from cell.metrology.light_plane import LightPlaneResult, StripeOnBoard, solve_light_plane
 from cell.metrology.motions import stack
@@ -34,6 +34,9 @@ def check_progress(views: Sequence[GatheredView], camera: CameraModel, gates: Ga
                    steps: Sequence[str]) -> tuple[Checked, ...]:
     """Hold the figures that are known by now against the gates of these steps.
 
+    Camera and light plane are solved, each by itself: that is cheap, and what they are worth hangs
+    on more than the number of views.
+
     Args:
         views: two at least.
         camera: as believed; the image's size and the rays of the stripe come from it.
@@ -53,6 +56,14 @@ def _with_spare(gates: Mapping[str, Gate]) -> dict[str, Gate]:
             if name == "used_views" else gate for name, gate in gates.items()}
 
 
+def camera_figures(result: CameraResult) -> dict[str, float]:
+    """What the gates of the camera look at."""
+    return {"rms_px": result.rms_px, "views": len(result.residuals),
+            "tilted_views": int(np.sum(result.tilts > TILTED)),
+            "covered_percent": 100.0 * result.covered,
+            "split_half_percent": 100.0 * result.split_half}
+
+
 def plane_figures(result: LightPlaneResult) -> dict[str, float]:
     """What the gates of the light plane look at."""
     near, far = result.depths
@@ -63,21 +74,20 @@ def plane_figures(result: LightPlaneResult) -> dict[str, float]:
 
 
 def _of_camera(views: Sequence[GatheredView], camera: CameraModel) -> dict[str, float]:
-    hit = coverage([view.seen for view in views], camera.image_size) > 0
-    return {"views": len(views), "covered_percent": 100.0 * float(np.mean(hit)),
-            "tilted_views": sum(view.board.tilt > TILTED for view in views)}
+    try:
+        return camera_figures(solve_camera([view.seen for view in views], camera.image_size,
+                                           camera))
+    except UnmeasurableError:
+        return {"views": len(views)}
 
 
 def _of_plane(views: Sequence[GatheredView], camera: CameraModel) -> dict[str, float]:
-    """Solve the plane with the camera as believed: that is cheap, and what it is worth by then
-    hangs on more than the number of poses.
-    """
     stripes = [StripeOnBoard(view.stripe, view.board.camera_from_board)
                for view in views if view.stripe is not None]
     try:
         return plane_figures(solve_light_plane(stripes, camera))
     except UnmeasurableError:
-        return {"poses": len(stripes), "depth_percent": 0.0}
+        return {"poses": len(stripes)}
 
 
 def _of_hand_eye(views: Sequence[GatheredView]) -> dict[str, float]:

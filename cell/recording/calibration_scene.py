@@ -122,7 +122,7 @@ def map_coverage(corners: Array, image_size: tuple[int, int]) -> Image:
 
 
 def _row(line: Line) -> str:
-    mark = {None: "", True: "ok", False: "**not yet**"}[line.good]
+    mark = {None: "", True: "ok", False: "**not met**"}[line.good]
     return f"| {line.name} | {line.value} | {line.wanted} | {mark} |\n"
 
 

@@ -1,4 +1,6 @@
-"""The first screen: every line a verdict; what residuals cannot show needs a reason."""
+"""Before anything moves: every line of the first screen has a verdict, what residuals cannot show
+needs a reason, and the boards are chosen.
+"""
 
 import json
 from dataclasses import replace
@@ -8,9 +10,11 @@ from pathlib import Path
 import pytest
 from made_operator import Scripted
 
+from cell.core.documents.calibration_session import CalibrationPlan
 from cell.core.errors import DocumentError
 from cell.core.ports import RobotIdentity
 from cell.programs.calibration.belief import read_belief
+from cell.programs.calibration.opening import PLACES_NEEDED, Opening
 from cell.programs.calibration.preconditions import (
     accept_preconditions,
     check_preconditions,
@@ -102,3 +106,22 @@ def test_a_cold_arm_is_seen_by_the_temperatures_of_the_last_set(belief, identity
     (home / "views.jsonl").write_text(json.dumps(view) + "\n")
     lines = check(replace(belief, folder=tmp_path), identity)
     assert lines["joints"].verdict == verdict
+
+
+def test_the_arms_own_rows_want_boards_in_two_places(belief):
+    operator = Scripted({"at all?": "all"})
+    first = belief.targets.boards[0]
+
+    def chosen(plan, *boards, what="hand-eye"):
+        targets = belief.targets.model_copy(update={"boards": boards})
+        opening = Opening(what, plan, replace(belief, targets=targets), None, operator, None)
+        return [board.id for board in opening._choose_boards()]
+
+    assert chosen(CalibrationPlan(kinematics=True), first) == ["table"]
+    assert operator.said == [PLACES_NEEDED]
+    other = first.model_copy(update={"id": "wall"})
+    assert chosen(CalibrationPlan(), first, other) == ["table", "wall"]
+    assert chosen(CalibrationPlan(board="wall", kinematics=True), first, other) == ["wall", "table"]
+    assert chosen(CalibrationPlan(), first, other, what="light-plane") == ["table"]
+    operator.answers = {"at all?": "one"}
+    assert chosen(CalibrationPlan(), first, other) == ["table"]

@@ -13,8 +13,8 @@ from cell.core.geometry import Plane
 from cell.core.optics import CameraModel, SensorModel
 from cell.metrology.board_pose import locate_boards
 from cell.metrology.calibration_gates import Checked, GateSet, Ruling, check_gates, worst
-from cell.metrology.calibration_progress import plane_figures
-from cell.metrology.camera_calibration import TILTED, CameraResult, solve_camera
+from cell.metrology.calibration_progress import camera_figures, plane_figures
+from cell.metrology.camera_calibration import CameraResult, solve_camera
 from cell.metrology.hand_eye_calibration import HandEyeAnswer, calibrate_hand_eye
 from cell.metrology.hand_eye_session import HandEyeSession
 from cell.metrology.light_plane import LightPlaneResult, StripeOnBoard, solve_light_plane
@@ -189,14 +189,6 @@ def chain_of(solution: Solution, belief: Belief) -> Chain:
     if solution.kinematics is not None and solution.kinematics.useful:
         return Chain(solution.kinematics.result.flange_from_camera, solution.kinematics.document)
     return Chain(answer.held_out.result.carrier_from_camera)
-
-
-def camera_figures(result: CameraResult) -> dict[str, float]:
-    """What the gates of the camera look at."""
-    return {"rms_px": result.rms_px, "views": len(result.residuals),
-            "tilted_views": int(np.sum(result.tilts > TILTED)),
-            "covered_percent": 100.0 * result.covered,
-            "split_half_percent": 100.0 * result.split_half}
 
 
 def board_shift(before: SeenView, again: SeenView, belief: Belief) -> float:
