@@ -12,6 +12,9 @@ from cell.core.documents.calibration import HandEyeDocument, SensorDocument
 from cell.core.documents.text import parse
 from cell.core.geometry import Transform
 from cell.core.optics import SensorModel
+from cell.metrology.set_change import Calibrated, changes
+
+MEANT = {"hand_eye": "the hand-eye", "light_plane": "the light plane", "focal": "the focal length"}
 
 
 @dataclass(frozen=True)
@@ -30,8 +33,14 @@ def compare_sets(folder: Path, first: str, second: str) -> tuple[Change, ...]:
     Raises:
         DocumentError: one is absent, damaged or wrong.
     """
-    (sensor, mount), (other_sensor, other_mount) = (_read(folder, name)
-                                                    for name in (first, second))
+    before, now = (_read(folder, name) for name in (first, second))
+    return (*_compare(before.sensor, before.flange_from_camera, now.sensor, now.flange_from_camera),
+            *(Change(f"{name}_times", f"{MEANT[name]}, over what both uncertainties explain", times,
+                     "times") for name, times in changes(before, now).items()))
+
+
+def _compare(sensor: SensorModel, mount: Transform, other_sensor: SensorModel,
+             other_mount: Transform) -> tuple[Change, ...]:
     _, turn = mount.distance(other_mount)
     focal = other_sensor.camera.matrix[0, 0] / sensor.camera.matrix[0, 0] - 1.0
     normals = float(np.clip(abs(sensor.light_plane.normal @ other_sensor.light_plane.normal), 0, 1))
@@ -60,8 +69,10 @@ def _point_shift(sensor: SensorModel, mount: Transform, other: SensorModel,
     return float(np.linalg.norm(points[0] - points[1]))
 
 
-def _read(folder: Path, name: str) -> tuple[SensorModel, Transform]:
+def _read(folder: Path, name: str) -> Calibrated:
     found = read_set(folder, name)
     sensor = parse(SensorDocument, found.texts["sensor"], found.sources["sensor"])
     hand_eye = parse(HandEyeDocument, found.texts["hand_eye"], found.sources["hand_eye"])
-    return sensor.model, Transform(np.array(hand_eye.flange_from_camera))
+    covariance = None if hand_eye.covariance is None else np.array(hand_eye.covariance)
+    return Calibrated(sensor.model, Transform(np.array(hand_eye.flange_from_camera)), covariance,
+                      "kinematics" in found.texts)
