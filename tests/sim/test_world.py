@@ -78,7 +78,7 @@ def test_without_errors_the_world_is_its_design():
     ("seed: 12", "sed: 12", "sed"),
     ("displacement_mm: 1.0", "displacement_mm: -1.0", "displacement_mm"),
     ("id: SI2", "id: SI1", "two holes have the same id"),
-    ("seed: 12", "seed: -5", "seed: expected greater than or equal to 0"),
+    ("seed: 12", "seed: -5", "seed: expected a number greater than or equal to 0"),
     ("model: ur10e", "model: ur99", "arm.model"),
     ("image_size: [768, 576]", "image_size: [0, 0]", "sensor.image_size"),
     ("normal: [0.05, -0.985, 0.16]", "normal: [0, 0, 0]", "expected a direction"),

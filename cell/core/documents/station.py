@@ -61,7 +61,7 @@ class CameraSettings(Document):
     """
 
     driver: Literal["sim", "video"]
-    source: Annotated[str, Field(min_length=1)] | int | None = None
+    source: Annotated[str, Field(pattern=r"\S")] | int | None = None
     scene: str | None = None
     exposure_ring_s: Exposure = 0.008
     exposure_laser_s: Exposure = 0.004
