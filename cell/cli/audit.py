@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from cell.cli.audit_words import as_json, print_audit, print_row
+from cell.cli.audit_words import as_json, print_audit, print_change, print_row
 from cell.cli.words import console, print_json
 
 if TYPE_CHECKING:
@@ -70,11 +70,11 @@ def audit(
     found, folders = gather_logs(logs)
     if since is not None:
         found = started_since(found, parse_since(since, datetime.now().astimezone()))
-    audits = []
+    audits, say = [], print_change if len(found) > 1 and question.what_if.asks else print_audit
     for each in _audit_with_progress(found, question, workers, cluster):
         audits.append(each)
         if not json_wanted:
-            print_audit(each)
+            say(each)
     code = _exit_code(audits, folders, strict)
     if json_wanted:
         print_json(as_json(audits, folders, code))

@@ -9,6 +9,7 @@ from math import inf, isfinite
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rich.box import SIMPLE
+from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
@@ -21,8 +22,10 @@ if TYPE_CHECKING:
 
 Json: TypeAlias = Any
 
-COLOURS = {"identical": "green", "reproduced": "green", "differs": "red", "refused": "red"}
+COLOURS = {"identical": "green", "reproduced": "green", "differs": "red", "refused": "red",
+           "stays": "green", "changes": "red"}
 MARKS = {True: "[green]yes[/]", False: "[red]no [/]", None: "[yellow]–  [/]"}
+WIDE = 120  # characters
 MOST = 24  # rows of a table; all are in the JSON
 
 
@@ -38,9 +41,26 @@ def print_audit(audit: LogAudit) -> None:
     for line in _lines(audit):
         answers.print(f"  {line}", highlight=False)
     if audit.differences:
-        answers.print(_differences(audit))
+        _print_table(_differences(audit))
     if audit.changes:
-        answers.print(_changes(audit.changes))
+        _print_table(_changes(audit.changes))
+
+
+def print_change(audit: LogAudit) -> None:
+    """Print one line on one recording under a what-if, or all of it where it was refused."""
+    if audit.problem is not None:
+        return print_audit(audit)
+    began = datetime.fromtimestamp(audit.started, UTC)
+    answers.print(f"{escape(audit.body_id):<24} {began:%Y-%m-%d %H:%M} UTC  "
+                  f"[{COLOURS[audit.answer]}]{audit.answer:<7}[/]  "
+                  f"{_plain(audit.verdict)} -> {_plain(audit.verdict_then)}"
+                  f"  {escape(', '.join(audit.turning))}", highlight=False, soft_wrap=True)
+    return None
+
+
+def _print_table(table: Table) -> None:
+    """Give a table the room that it needs where no screen sets a width."""
+    (answers if answers.is_terminal else Console(width=WIDE)).print(table)
 
 
 def print_row(audits: Sequence[LogAudit], folders: Sequence[FolderAudit]) -> None:
@@ -48,9 +68,7 @@ def print_row(audits: Sequence[LogAudit], folders: Sequence[FolderAudit]) -> Non
     if len(audits) != 1:
         words = [f"{sum(audit.answer == answer for audit in audits)} {answer}"
                  for answer in COLOURS if any(audit.answer == answer for audit in audits)]
-        turned = sum(any(change.turns for change in audit.changes) for audit in audits)
-        answers.print(f"{len(audits)} recordings: {', '.join(words) or 'none'}"
-                      + (f"; verdicts change in {turned}" if turned else ""), highlight=False)
+        answers.print(f"{len(audits)} recordings: {', '.join(words) or 'none'}", highlight=False)
     for folder in folders:
         for finding in folder.findings:
             answers.print(f"[red]{finding.kind}[/] {escape(finding.file)}: "
@@ -58,7 +76,7 @@ def print_row(audits: Sequence[LogAudit], folders: Sequence[FolderAudit]) -> Non
         if folder.head:
             answers.print(f"newest head {folder.head} ({folder.newest})\n"
                           "keep it elsewhere: it shows when the newest bodies are removed",
-                          highlight=False)
+                          highlight=False, soft_wrap=True)
 
 
 def as_json(audits: Sequence[LogAudit], folders: Sequence[FolderAudit], code: int
@@ -106,7 +124,8 @@ def _lines(audit: LogAudit) -> list[str]:
     lines += [f"{name}: {escape(was)} then, {escape(here)} here"
               for name, (was, here) in audit.versions.items()]
     if audit.verdict_then is not None:
-        lines.append(f"verdict {_plain(audit.verdict)}, now {_plain(audit.verdict_then)}")
+        lines.append(f"verdict {_plain(audit.verdict)}, {'would be' if audit.what_if else 'now'} "
+                     f"{_plain(audit.verdict_then)}")
     return lines
 
 

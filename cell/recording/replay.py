@@ -13,10 +13,11 @@ from rerun.experimental import ViewerClient
 from cell.core.documents.record import HoleRecord, Start, Stop
 from cell.core.errors import DeviceError, DocumentError
 from cell.recording import layout
+from cell.recording.audit_picture import comparison_blueprint, is_comparison
 from cell.recording.hole_scene import order_of_views
 from cell.recording.integrity import check_seal
 from cell.recording.pages import Page, read_pages
-from cell.recording.rows import damage_explained
+from cell.recording.rows import damage_explained, open_chunks
 from cell.recording.scene import Scene
 from cell.recording.stream import encode
 from cell.recording.viewer import (
@@ -29,7 +30,7 @@ from cell.recording.viewer import (
 )
 
 PATIENCE_S = 60.0
-SETTLE_S = 3.0  # until a software renderer has drawn what it was told
+SETTLE_S = 6.0  # until a software renderer has drawn, and the viewer has said what it says first
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,8 @@ def survey(log: Path) -> Survey:
     Raises:
         DocumentError: it is unreadable.
     """
+    if is_comparison(log):
+        return Survey(log, {}, ("a picture that an audit drew, no evidence",))
     _, checks = check_seal(log)
     warnings = [check.words for check in checks if check.passed is False or check.level == "seal"]
     holes: dict[str, int] = {}
@@ -93,13 +96,13 @@ def replay(log: Path, url: str, open_at: int | None = None) -> None:
         DocumentError: the recording is unreadable.
         DeviceError: nobody takes it.
     """
-    pages = read_pages(log)
-    start = next(pages).record
-    assert isinstance(start, Start)  # `read_pages` sees to it
-    stream = rr.RecordingStream(layout.APPLICATION, recording_id=start.recording_id)
+    stream = rr.RecordingStream(layout.APPLICATION, recording_id=_recording_id(log))
     stream.connect_grpc(url)
     with damage_explained(log):
-        _draw(stream, Scene(stream, start, open_at=open_at), pages)
+        if is_comparison(log):
+            _send_comparison(log, stream)
+        else:
+            draw(log, stream, open_at)
     try:
         stream.flush(timeout_sec=PATIENCE_S)
     except (RuntimeError, ValueError) as error:
@@ -107,7 +110,14 @@ def replay(log: Path, url: str, open_at: int | None = None) -> None:
     stream.disconnect()
 
 
-def _draw(stream: rr.RecordingStream, scene: Scene, pages: Iterator[Page]) -> None:
+def draw(log: Path, stream: rr.RecordingStream, open_at: int | None = None) -> None:
+    """Draw a recording anew from its audited records.
+
+    Raises:
+        DocumentError: it is unreadable.
+    """
+    pages = read_pages(log)
+    scene = Scene(stream, _begin(pages), open_at=open_at)
     for number, page in enumerate(pages):
         if isinstance(page.record, HoleRecord):
             stream.set_time(layout.HOLE_TIMELINE, sequence=number)
@@ -117,6 +127,23 @@ def _draw(stream: rr.RecordingStream, scene: Scene, pages: Iterator[Page]) -> No
             scene.add(number, page.record)
         elif isinstance(page.record, Stop):
             scene.finish(page.record)
+
+
+def _send_comparison(log: Path, stream: rr.RecordingStream) -> None:
+    """Send what an audit drew: it is a picture, and was never more."""
+    stream.send_blueprint(comparison_blueprint())
+    with open_chunks(log) as chunks:
+        stream.send_chunks(chunks)
+
+
+def _recording_id(log: Path) -> str:
+    return log.stem if is_comparison(log) else _begin(read_pages(log)).recording_id
+
+
+def _begin(pages: Iterator[Page]) -> Start:
+    start = next(pages).record
+    assert isinstance(start, Start)  # `read_pages` sees to it
+    return start
 
 
 def show(log: Path, number: int) -> None:
@@ -129,7 +156,7 @@ def show(log: Path, number: int) -> None:
     _check_display()
     port = free_port()
     with viewer_process("--port", str(port)) as process:
-        viewer = _connect(port)
+        viewer = connect(port)
         replay(log, hub_url(port))
         _go_to(viewer, number)
         process.wait()
@@ -182,7 +209,7 @@ def photograph(log: Path, number: int) -> Photograph:
     """
     port = free_port()
     with viewer_process("--headless", "--port", str(port)):
-        viewer = _connect(port)
+        viewer = connect(port)
         replay(log, hub_url(port))
         _go_to(viewer, number)
         time.sleep(SETTLE_S)
@@ -195,8 +222,12 @@ def _check_display() -> None:
         raise DeviceError("there is no screen here: use --web or --picture", device="viewer")
 
 
-def _connect(port: int) -> ViewerClient:
-    """Reach a viewer that is just starting."""
+def connect(port: int) -> ViewerClient:
+    """Reach a viewer that is just starting.
+
+    Raises:
+        DeviceError: it does not start.
+    """
     for _ in _until(PATIENCE_S):
         try:
             viewer = ViewerClient.connect(hub_url(port))

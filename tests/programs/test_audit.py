@@ -9,7 +9,6 @@ import yaml
 from recorded_body import GOLDEN, measured_anew, record_body
 
 from cell.core.documents.result import Measured
-from cell.core.errors import RecordingError
 from cell.programs.audit.folder import audit_folder
 from cell.programs.audit.log import audit_log
 from cell.programs.audit.question import Question, WhatIf
@@ -229,8 +228,12 @@ def test_both_results_are_saved_over_the_same_image_where_they_differ(folder):
                                     "/comparison")} == {1}
     assert log.read_bytes() == before
     assert not [finding for finding in audit_folder(folder).findings if "audit" in finding.file]
-    with pytest.raises(RecordingError, match="cannot be written"):
-        audit_log(log, Question(save=True))
+    assert "cannot be written: File exists" in audit_log(log, Question(save=True)).problem
+
+
+def test_where_nothing_differs_no_picture_is_saved(log):
+    assert audit_log(log, Question(save=True)).answer == "identical"
+    assert not log.with_suffix(".audit.rrd").exists()
 
 
 def test_the_recording_of_the_first_format_still_audits():

@@ -10,14 +10,16 @@ import time
 
 import numpy as np
 import pytest
+import rerun as rr
 from recorded_body import measured_anew, record_body
+from rerun.chunk import LazyChunkStream
 
 from cell.core.errors import DeviceError, DocumentError
 from cell.recording import Recorder, read
 from cell.recording.live import LiveView
-from cell.recording.replay import photograph, survey
+from cell.recording.replay import connect, draw, photograph, replay, survey
 from cell.recording.rows import open_chunks
-from cell.recording.viewer import free_port, viewer_process
+from cell.recording.viewer import free_port, hub_url, viewer_process
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +71,41 @@ def test_the_viewer_shows_it_without_complaints(log):
     assert picture.complaints == ()
     assert picture.png.startswith(b"\x89PNG")
     assert len(picture.png) > 50_000
+
+
+def test_the_layout_lets_the_viewer_stand_at_a_hole(log):
+    """A browser cannot be told where to stand: the layout must."""
+    try:
+        with viewer_process("--headless", "--port", str(port := free_port())):
+            viewer = connect(port)
+            replay(log, hub_url(port), open_at=2)
+            deadline = time.monotonic() + 30.0
+            while time.monotonic() < deadline and standing(viewer) != [2]:
+                time.sleep(0.2)
+            assert standing(viewer) == [2]
+    except DeviceError as error:
+        pytest.skip(f"no headless viewer can run here: {error}")
+
+
+def standing(viewer):
+    return [recording.current_time for recording in viewer.get_state().recordings]
+
+
+def test_what_is_shown_does_not_come_from_the_picture_in_the_file(log, tmp_path):
+    """Whoever repaints the picture in a file, `cell view` shows the audited numbers."""
+    with open_chunks(log) as chunks:
+        kept = [chunk for chunk in chunks if not chunk.entity_path.startswith("/verdict")]
+    bare = tmp_path / "bare.rrd"
+    LazyChunkStream.from_iter(iter(kept)).write_rrd(str(bare), application_id="cell",
+                                                    recording_id="body")
+    assert drawn(bare, "/verdict", "TextDocument:text") == []
+    shown = tmp_path / "shown.rrd"
+    stream = rr.RecordingStream("cell", recording_id="body")
+    stream.set_sinks(rr.FileSink(shown))
+    draw(bare, stream)
+    stream.disconnect()
+    assert drawn(shown, "/verdict", "TextDocument:text") == drawn(log, "/verdict",
+                                                                  "TextDocument:text")
 
 
 @pytest.mark.parametrize("how", ["absent", "hung"])

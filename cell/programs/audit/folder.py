@@ -14,7 +14,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from cell.recording.audit_picture import SUFFIX as PICTURE
+from cell.recording.audit_picture import is_comparison
 from cell.recording.seal import SUFFIX, Seal, read_seals, reference, seal_path
 
 Kind: TypeAlias = Literal["missing", "reordered", "duplicated", "foreign", "unsealed"]
@@ -107,5 +107,5 @@ def _unsealed(folder: Path, seals: Mapping[Path, Seal]) -> Iterator[Finding]:
     known = {seal.file for seal in seals.values()}
     known |= {seal.original.file for seal in seals.values() if seal.original is not None}
     for path in sorted(folder.glob("*.rrd")):
-        if path.name not in known and not path.name.endswith(PICTURE):
+        if path.name not in known and not is_comparison(path):
             yield Finding("unsealed", path.name, "has no seal: a run that died, or a stranger")

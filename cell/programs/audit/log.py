@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeAlias
@@ -13,7 +14,7 @@ import numpy as np
 from cell.core.documents.papers import Papers
 from cell.core.documents.record import Attempt, HoleRecord, Start, Stop
 from cell.core.documents.result import BodyResult, Outcome
-from cell.core.errors import CellError, DocumentError
+from cell.core.errors import CellError
 from cell.metrology.decide import judge_run
 from cell.metrology.measure import measure_hole
 from cell.programs.audit.compare import Comparison, Difference, compare
@@ -52,14 +53,13 @@ def audit_log(log: Path, question: Question = PLAIN, watch: Watch = unwatched) -
             return LogAudit(log, problem, checks=tuple(checks))
         pages = read_pages(log)
         audit = _Audit(log, question, next(pages))
-        for count, page in enumerate(pages):
-            audit.take(page)
-            watch(count)
+        with audit.drawing():
+            for count, page in enumerate(pages):
+                audit.take(page)
+                watch(count)
         return audit.close(log, seal, checks)
-    except DocumentError as error:
+    except CellError as error:
         return LogAudit(log, str(error), checks=tuple(checks))
-    except CellError:
-        raise
     except Exception as error:  # noqa: BLE001  whatever it holds must not stop the others
         return LogAudit(log, f"cannot be measured again: {error!r}", checks=tuple(checks))
 
@@ -97,6 +97,10 @@ class _Audit:
         self._warnings: list[str] = []
         self._skipped = 0
 
+    def drawing(self) -> AbstractContextManager[object]:
+        """Close the picture at the end, if there is one."""
+        return nullcontext() if self._picture is None else closing(self._picture)
+
     def take(self, page: Page) -> None:
         """Take the next page: measure its hole again, or hear how the run ended."""
         self._faults += page.faults
@@ -110,8 +114,6 @@ class _Audit:
 
     def close(self, log: Path, seal: Seal | None, checks: list[Check]) -> LogAudit:
         """Judge the body again and say what came of it."""
-        if self._picture is not None:
-            self._picture.close()
         then = as_recorded(judge_run(self._papers, self._start, self._then))
         recorded = self._stop.result if self._stop is not None else None
         if recorded is not None and not self._what_if:
@@ -127,7 +129,8 @@ class _Audit:
             self._page.chain, len(self._recorded), tuple(checks), self._numbers,
             tuple(self._differences), _versions_that_differ(self._start), tuple(self._warnings),
             self._skipped, recorded.verdict if recorded is not None else None, then.verdict,
-            _changes(recorded, then) if recorded is not None and self._what_if else ())
+            _changes(recorded, then) if recorded is not None and self._what_if else (),
+            self._what_if)
 
     def _check_records(self) -> Check:
         wrong = list(contradictions(self._plan, self._recorded, self._stop))

@@ -11,7 +11,8 @@ from typing import Literal, TypeAlias
 from cell.programs.audit.compare import Difference
 from cell.recording.integrity import Check
 
-Answer: TypeAlias = Literal["identical", "reproduced", "differs", "refused"]
+Answer: TypeAlias = Literal["identical", "reproduced", "differs", "refused", "stays", "changes"]
+"""The last two are those of a what-if: whether a verdict does."""
 
 
 @dataclass(frozen=True)
@@ -56,12 +57,20 @@ class LogAudit:
     verdict: str | None = None
     verdict_then: str | None = None
     changes: tuple[Change, ...] = ()
+    what_if: bool = False
+
+    @property
+    def turning(self) -> tuple[str, ...]:
+        """The features whose verdicts change under the what-if."""
+        return tuple(change.feature for change in self.changes if change.turns)
 
     @property
     def answer(self) -> Answer:
         """The worst of what was found."""
         if self.problem is not None:
             return "refused"
+        if self.what_if:
+            return "changes" if self.turning else "stays"
         if self.numbers["differs"]:
             return "differs"
         return "reproduced" if self.numbers["reproduced"] else "identical"
@@ -75,5 +84,5 @@ class LogAudit:
         """
         if self.answer == "refused":
             return 2
-        different = self.answer == "differs" or (strict and self.answer == "reproduced")
-        return int(different or any(change.turns for change in self.changes))
+        different = self.answer in ("differs", "changes")
+        return int(different or (strict and self.answer == "reproduced"))
