@@ -170,12 +170,12 @@ def _run(what: What, asked: Asked) -> None:
     solution = finished.solution
     if asked.as_json:
         print_json({"verdict": solution.verdict, "reasons": list(solution.reasons),
-                    "set": finished.set_id, "active": finished.active,
-                    "session": str(finished.session),
+                    "accepted": finished.accepted, "set": finished.set_id,
+                    "active": finished.active, "session": str(finished.session),
                     "gates": {step: [{**vars(gate), "value": _number(gate.value)}
                                      for gate in gates]
                               for step, gates in solution.gates.items()}})
-    raise typer.Exit(REFUSED if solution.verdict == "refuse" else ACCEPTED)
+    raise typer.Exit(ACCEPTED if finished.accepted else REFUSED)
 
 
 def _answer_as_json(answer: HandEyeAnswer, notes: tuple[str, ...]) -> dict[str, Any]:

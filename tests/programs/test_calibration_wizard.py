@@ -178,5 +178,5 @@ def test_warnings_need_a_reason(plant, finished, tmp_path):
     operator = Scripted()
     belief = read_belief(plant, "demo")
     result = conclude(Session.read(folder), belief, operator, Shown(belief, "all", "", None))
-    assert result.set_id is None
+    assert result.set_id is None and not result.accepted
     assert operator.heard("Why is this set acceptable") or operator.heard("Refused")

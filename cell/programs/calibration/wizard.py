@@ -41,12 +41,13 @@ class Request:
 
 @dataclass(frozen=True, eq=False)
 class Finished:
-    """What came of it: the set is None where it was refused, not wanted, or the camera alone."""
+    """What came of it: there is no set where it was not accepted, and none of the camera alone."""
 
     session: Path
     solution: Solution
-    set_id: str | None
-    active: bool
+    accepted: bool
+    set_id: str | None = None
+    active: bool = False
 
 
 def run_wizard(request: Request, operator: Operator) -> Finished:
@@ -85,14 +86,15 @@ def conclude(session: Session, belief: Belief, operator: Operator, shown: Shown)
     shown.concluded(page_of(solution, session.header, belief, signature))
     reason = _accepted(solution, session.header, operator)
     session.conclude(f"{solution.verdict}{'' if reason is None else ', accepted'}")
+    finished = Finished(session.folder, solution, accepted=reason is not None)
     if reason is None or session.header.what == "camera":
-        return Finished(session.folder, solution, None, active=False)
+        return finished
     set_id = make_set(session, solution, belief, replace(signature, reason=reason))
     operator.tell(f"set {set_id} made: {belief.folder / 'sets' / set_id / 'report.html'}")
     if not (session.header.plan.activate and operator.confirm(f"Activate {set_id}?")):
-        return Finished(session.folder, solution, set_id, active=False)
+        return replace(finished, set_id=set_id)
     activate(belief.folder, set_id, by=signature.by, at=_now("%Y-%m-%dT%H:%M:%SZ"), reason=reason)
-    return Finished(session.folder, solution, set_id, active=True)
+    return replace(finished, set_id=set_id, active=True)
 
 
 def show(solution: Solution, operator: Operator) -> None:
@@ -116,7 +118,9 @@ def _accepted(solution: Solution, header: SessionHeader, operator: Operator) -> 
     if solution.verdict == "refuse":
         operator.tell("Refused: no set is made. The session is kept.")
         return None
-    if solution.found == "pass":
+    if header.what == "camera":
+        operator.tell("The camera alone makes no set: `cell calibrate all` does.")
+    if solution.found == "pass" or header.what == "camera":
         return header.accepted
     reason = header.plan.reason or operator.ask("There are warnings. Why is this set acceptable? "
                                                 "(empty: it is not)", "")
