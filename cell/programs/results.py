@@ -16,7 +16,7 @@ from cell.core.documents.papers import Papers
 from cell.core.documents.record import HoleRecord, Start, Stop
 from cell.core.errors import DocumentError
 from cell.metrology.decide import judge_run
-from cell.recording.pages import PRUNED, Page, read_pages
+from cell.recording.pages import PRUNED, read_pages
 from cell.results.booking import BodyRows, Booking, Row, body_rows, book
 from cell.results.database import Database, connect, open_database, recreate_results
 from cell.results.tables import bodies
@@ -73,9 +73,9 @@ def read_rows(log: Path) -> BodyRows:
     """Turn a recording into its rows. One that died is judged by the holes that it holds.
 
     Raises:
-        DocumentError: it is no recording, or its papers are not whole.
+        DocumentError: it is no recording, its papers are not whole, or it is altered.
     """
-    start, records, stop, chain = _papers_of(read_pages(log))
+    start, records, stop, chain = _papers_of(log)
     papers = Papers.parse(start.papers, start.set_id)
     left = None if stop else judge_run(papers, start, records)
     return body_rows(Booking(start, stop, papers.job.name, papers.station.name, log.name, chain,
@@ -100,11 +100,14 @@ def utc(moment: float | None) -> str:
     return datetime.fromtimestamp(moment, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
-def _papers_of(pages: Iterator[Page]) -> tuple[Start, list[HoleRecord], Stop | None, str]:
+def _papers_of(log: Path) -> tuple[Start, list[HoleRecord], Stop | None, str]:
     """Gather the records of a recording, without its images, and the head of its chain."""
     start = stop = None
     records, chain = [], ""
-    for page in pages:
+    for page in read_pages(log):
+        if page.faults:
+            raise DocumentError(f"is not as it was recorded: {'; '.join(page.faults)}",
+                                source=str(log))
         chain = page.chain
         if isinstance(page.record, Start):
             start = page.record

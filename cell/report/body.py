@@ -99,7 +99,7 @@ def _closer_looks(run: BodyRun, result: BodyResult | None) -> list[dict[str, obj
 
 def _crops(record: HoleRecord) -> list[tuple[str, str]]:
     located = record.outcome.located if isinstance(record.outcome, Measured) else None
-    last = {view.light: view.image for view in record.observation.views}
+    last = {view.light: view.image for view in record.observation.views if view.image.size}
     return [(light, draw_crop(image, located)) for light, image in sorted(last.items(),
                                                                           reverse=True)]
 
