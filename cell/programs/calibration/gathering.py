@@ -57,10 +57,13 @@ class Gathering:
             if self._is_spared(number):
                 continue
             wish = self._arrive(number)
-            if wish == "retake" and last:
-                waiting.extendleft([number] if last == number else [number, last])
+            if wish == "retake":
+                waiting.extendleft([number] if last in (0, number) else [number, last])
                 continue
-            self._skip(number) if wish == "skip" else self._capture(number)
+            if wish == "skip":
+                self._skip(number)
+            else:
+                self._capture(number)
             last = number
         self._say_how_far()
 
