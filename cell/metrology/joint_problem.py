@@ -26,7 +26,7 @@ from cell.metrology.joint_rows import (
 )
 
 MOST_STEPS = 12
-STILL = 1e-5  # mm: far below anything that can be measured
+STILL = 1e-4  # mm: a hundredth of what can be measured
 HUBER = 3.0  # single points beyond so many sigma lose weight
 
 
