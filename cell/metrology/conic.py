@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from cell.core.geometry import Array
 from cell.metrology.reasons import refusal
+from cell.metrology.spread import middle
 
 SAMPSON_STEPS = 3  # reweightings: the algebraic distance becomes the geometric one
 HUBER_STEPS = 3
@@ -91,7 +92,7 @@ def fit_line(points: Array) -> Array:
     line = _line_through(points, np.ones(len(points)))
     for _ in range(HUBER_STEPS):
         distance = np.abs(points @ line[:2] + line[2])
-        limit = HUBER * MAD_TO_SIGMA * float(np.median(distance)) + np.finfo(float).tiny
+        limit = HUBER * MAD_TO_SIGMA * middle(distance) + np.finfo(float).tiny
         line = _line_through(points, np.minimum(1.0, limit / np.maximum(distance, limit)))
     return line
 

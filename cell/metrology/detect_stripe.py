@@ -11,7 +11,7 @@ from cell.metrology.ellipse import Ellipse
 from cell.metrology.features import Expected, Rim, Stripe
 from cell.metrology.reasons import refusal
 from cell.metrology.ridge import Ridge, find_ridges, runs_upright
-from cell.metrology.spread import correlation_length, robust_sigma, tukey_weights
+from cell.metrology.spread import correlation_length, middle, robust_sigma, tukey_weights
 from cell.metrology.stripe_centres import HALF_WINDOW, centre_stripe
 
 DIE_ROLL = 0.7      # mm beside the rim, where a sheet of unknown thickness bends into the hole
@@ -44,7 +44,7 @@ def follow_stripe(image: Image, ridge: Ridge, rim: Rim, sensor: SensorModel,
     v, side = _lines_beside(image, ridge, hole, _reaches(ridge, hole, sensor, expected))
     _check_length(side)
     u, height = centre_stripe(image, ridge, v)
-    bright = height > 0.3 * np.median(height)
+    bright = height > 0.3 * middle(height)
     points, side = ridge.pixels(u[bright], v[bright]), side[bright]
     _check_length(side)
     miss, scale = _straightness(points, sensor.camera, ridge.upright)
@@ -124,10 +124,9 @@ def _straightness(points: Array, camera: CameraModel, upright: bool) -> tuple[Ar
     across, along = camera.normalise(points).T[::1 if upright else -1]
     focal = float(camera.matrix[0, 0] if upright else camera.matrix[1, 1])
     rows = np.column_stack([np.ones_like(along), along])
-    miss, scale = across - np.median(across), 1.0
+    miss, scale = across - middle(across), 1.0
     for _ in range(5):
         scale = max(1e-3 / focal, robust_sigma(miss))
-        weight = np.sqrt(tukey_weights(miss, scale))
-        line = np.linalg.lstsq(rows * weight[:, None], across * weight, rcond=None)[0]
-        miss = across - rows @ line
+        weighed = (rows * tukey_weights(miss, scale)[:, None]).T
+        miss = across - rows @ np.linalg.solve(weighed @ rows, weighed @ across)
     return miss * focal, scale * focal

@@ -35,8 +35,8 @@ def correlation_length(residuals: Array) -> float:
     The variance of a mean of n residuals is that of one, times this, over n.
     """
     centred = residuals - residuals.mean()
-    spectrum = np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2
-    product = np.fft.irfft(spectrum)[:min(LONGEST, len(centred))]
+    beyond = np.zeros(min(LONGEST, len(centred)) - 1)
+    product = np.correlate(np.concatenate([centred, beyond]), centred, "valid")
     shares = product[1:] / max(float(product[0]), 1e-12)
     end = int(np.argmax(shares < NEGLIGIBLE)) if (shares < NEGLIGIBLE).any() else len(shares)
     return float(1.0 + 2.0 * shares[:end].sum())

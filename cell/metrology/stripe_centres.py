@@ -48,7 +48,13 @@ def _cut(image: Image, course: Course, v: Array) -> tuple[Array, Array]:
     window = np.arange(-HALF_WINDOW, HALF_WINDOW + 1)
     u = np.rint(course.across(v)).astype(np.intp)[:, None] + window
     grey = turned[v.astype(np.intp)[:, None], u].astype(np.float64)
-    left, right = (cv2.blur(np.median(part, axis=1).reshape(-1, 1), (1, 15))
+    left, right = (cv2.blur(_median_of_four(part)[:, None], (1, 15))
                    for part in (grey[:, :4], grey[:, -4:]))
     ramp = np.linspace(0.0, 1.0, grey.shape[1])
     return u.astype(np.float64), grey - left * (1.0 - ramp) - right * ramp
+
+
+def _median_of_four(values: Array) -> Array:
+    """Give the median of each row (n, 4): as `np.median`, at a fraction of its cost."""
+    ordered = np.sort(values, axis=1)
+    return np.asarray((ordered[:, 1] + ordered[:, 2]) / 2.0)
