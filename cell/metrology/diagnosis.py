@@ -65,7 +65,8 @@ def as_given(session: HandEyeSession) -> Reading:
     """Read the session as it claims to be meant."""
     middle = Transform.from_parts(np.zeros(3), session.board_middle)
     boards = stack(board.camera_from_board for board in session.boards) @ middle.matrix
-    return Reading("as_given", "as given", session.base_from_flange, boards, session.mount)
+    return Reading("as_given", "as given", session.base_from_flange, boards, session.mount,
+                   session.numbers)
 
 
 def _contradicting(session: HandEyeSession) -> dict[int, Finding]:

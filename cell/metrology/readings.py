@@ -32,6 +32,7 @@ class Reading:
     """One way to read the lists of robot poses and board poses, (n, 4, 4) each.
 
     The boards' origin is in their middle, so that a miss is one of the board and not of its corner.
+    `numbers` are the views' names in sentences.
     """
 
     code: str
@@ -39,6 +40,7 @@ class Reading:
     base_from_flange: Array
     camera_from_board: Array
     mount: Mount
+    numbers: tuple[int, ...] = ()
 
     @property
     def distance(self) -> float:
@@ -131,7 +133,7 @@ def _swapped(given: Reading) -> Iterator[Reading]:
         i, j = np.flatnonzero(order != np.arange(count))
         yield replace(given, code="views_swapped",
                       camera_from_board=given.camera_from_board[order],
-                      says=f"views {i} and {j} look exchanged")
+                      says=f"views {given.numbers[i]} and {given.numbers[j]} look exchanged")
 
 
 def _park_with_scale(M: Array, B: Array) -> tuple[Array, Array, float]:

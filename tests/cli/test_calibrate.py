@@ -86,6 +86,19 @@ def test_the_mount_is_found_in_the_data_where_nobody_says_it(solve, sessions, tm
     assert told["notes"] == []
 
 
+@pytest.mark.parametrize("name", ["ic_charuco_own_intr", "moveit_solver", "ur5e_d415"])
+def test_inverted_poses_are_told_from_the_other_mount(solve, sessions, tmp_path, name):
+    folder = shutil.copytree(sessions / name, tmp_path / name)
+    (folder / "expected.yaml").unlink()
+    rows = (folder / "base_from_flange.csv").read_text().splitlines()
+    table = np.array([[float(cell) for cell in row.split(",")] for row in rows[1:]])
+    table[:, 1:] = np.linalg.inv(table[:, 1:].reshape(-1, 4, 4)).reshape(-1, 16)
+    np.savetxt(folder / "base_from_flange.csv", table, delimiter=",", header=rows[0], comments="")
+    code, answer = solve(folder, "--gates", "coarse")
+    assert (code, answer["verdict"]) == (1, "refuse")
+    assert "poses look inverted" in answer["reasons"][0]
+
+
 def test_a_session_in_metres_is_named_and_not_corrected(solve, copy):
     rows = (copy / "base_from_flange.csv").read_text().splitlines()
     table = np.array([[float(cell) for cell in row.split(",")] for row in rows[1:]])

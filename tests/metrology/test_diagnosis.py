@@ -124,6 +124,14 @@ def test_swapped_views(good, pair):
     assert answer.held_out is None, "nothing is solved from a misread session"
 
 
+def test_exchanged_views_are_called_by_their_names(good):
+    def swap(poses):
+        poses[[4, 10]] = poses[[10, 4]]
+
+    named = robot(good, swap).numbered(tuple(range(100, 120)))
+    assert "views 104 and 110 look exchanged" in refused(named, "views_swapped").reasons[0]
+
+
 def test_lists_that_do_not_belong_together(good):
     order = np.random.default_rng(4).permutation(len(good))
     refused(replace(good, base_from_flange=good.base_from_flange[order]), "unrelated")

@@ -31,11 +31,13 @@ from cell.metrology.calibration_gates import GateBook
 from cell.metrology.diagnosis import as_given
 from cell.metrology.hand_eye import Mount
 from cell.metrology.hand_eye_session import HandEyeSession
+from cell.metrology.hand_eye_start import solve_park
 from cell.metrology.motions import nearest_rotation
 from cell.metrology.readings import fit_reading
 
 ROUNDED = 1e-3  # of R Rᵀ = 1: digits lost in print; beyond it the matrix is no rotation
 FLAT = 1e-3     # mm
+TOO_FAR = 2.0   # times: an arm carries nothing so much farther out than the rest stands away
 COLUMNS = ("view", *(f"m{row}{column}" for row in range(4) for column in range(4)))
 
 
@@ -171,14 +173,35 @@ def _stated_mount(folder: Path) -> Mount | None:
 
 
 def _choose_mount(folder: Path, session: HandEyeSession) -> tuple[HandEyeSession, str]:
-    """Let the data say how the camera is mounted: the mount under which the board stands still."""
+    """Let the data say how the camera is mounted: the mount under which the board stands still.
+
+    Poses given the other way round fit the other mount as well; what tells is that no arm carries
+    what is farther from its flange than the rest is from its base.
+    """
     mounts: tuple[Mount, Mount] = ("flange", "static")
     fits = {mount: fit_reading(as_given(session.mounted(mount))) for mount in mounts}
     best, other = sorted(mounts, key=lambda mount: fits[mount].miss)
-    return session.mounted(best), (
-        f"nothing in {folder.name} says how the camera is mounted: taken as {best}, where the "
-        f"board stands still to {fits[best].miss:.3g} mm (as {other}: {fits[other].miss:.3g} mm). "
-        "Poses given the other way round would look the same: say --mount if it is known")
+    carried, standing = _reach(session.mounted(best), fits[best].scale)
+    chosen = other if carried > TOO_FAR * standing else best
+    doubt = ("" if chosen == best else f", but then the arm would carry something {carried:.0f} mm "
+             f"from its flange, and the rest stand {standing:.0f} mm from its base")
+    return session.mounted(chosen), (
+        f"nothing in {folder.name} says how the camera is mounted: taken as {chosen}. As {best}, "
+        f"the board stands still to {fits[best].miss:.3g} mm{doubt}; as {other}, to "
+        f"{fits[other].miss:.3g} mm. Say --mount if it is known")
+
+
+def _reach(session: HandEyeSession, scale: float) -> tuple[float, float]:
+    """Say how far from the flange is what the arm carries, and from the base what stands, in the
+    unit of the board; the robot's is `scale` times that.
+    """
+    given = as_given(session)
+    moving, boards = given.reference_from_carrier.copy(), given.camera_from_board
+    moving[:, :3, 3] /= scale
+    camera = solve_park(moving, boards)
+    to_board = float(np.median(np.linalg.norm((moving @ camera.matrix @ boards)[:, :3, 3], axis=1)))
+    to_camera = float(np.linalg.norm(camera.translation))
+    return (to_camera, to_board) if session.mount == "flange" else (to_board, to_camera)
 
 
 def _same_length(folder: Path, robot: Array, others: Array | list[BoardView]) -> None:
