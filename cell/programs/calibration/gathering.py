@@ -69,10 +69,11 @@ class Gathering:
 
     def _take_up(self) -> None:
         """See again what is on the disk."""
-        for view in self.session.views:
+        views = self.session.views
+        for view in views:
             if view.status == "ok" and view.purpose != "sphere":
                 self.progress.know(see_again(view, self.session, self.belief))
-        self.shown.plan(self.session, self.progress)
+        self.shown.plan(self.session.header, views)
 
     def _is_spared(self, number: int) -> bool:
         """Tell whether a view to be fitted to is not needed any more: the goal is reached."""

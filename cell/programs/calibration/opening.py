@@ -75,6 +75,7 @@ class Opening:
         targets += self._plan_sphere(sphere, placed[0])
         header = self._header(placed, targets, sphere).model_copy(update={
             "preconditions": conditions, "accepted": accepted})
+        self.shown.plan(header)
         self._agree(f"{_counted(targets)} are planned, all moves checked{_worth(predicted)}. Drive "
                     f"them at half speed? (Keys then: {SAY_KEYS}.)")
         name = f"{_now('%Y-%m-%dT%H%M%SZ')}-{self.what}"

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from cell.core.documents.calibration_session import SessionHeader
+from cell.core.documents.calibration_session import SessionHeader, ViewRecord
 from cell.core.geometry import Array, Transform
 from cell.core.observation import View
 from cell.metrology.calibration_gates import Checked
@@ -19,7 +19,6 @@ from cell.programs.calibration.belief import Belief, design_of
 from cell.programs.calibration.capture import Shots
 from cell.programs.calibration.progress import Progress
 from cell.programs.calibration.seen import SeenView
-from cell.programs.calibration.session import Session
 from cell.programs.calibration.start_look import StartLook
 from cell.recording.calibration_moment import (
     CalibrationMoment,
@@ -54,16 +53,15 @@ class Shown:
                    base_from_camera=self._camera(look.view),
                    lines=look.lines, figures=tuple(look.figures.items()))
 
-    def plan(self, session: Session, progress: Progress) -> None:
+    def plan(self, header: SessionHeader, views: Sequence[ViewRecord] = ()) -> None:
         """Show the planned views, and which of them are there already."""
-        header = session.header
-        done = {view.number: view.status == "ok" for view in session.views}
+        done = {view.number: view.status == "ok" for view in views}
         states: dict[bool | None, ViewState] = {None: "planned", True: "taken", False: "left out"}
-        self._show(planned=tuple(
-            PlannedView(number, self._reached(target.joints), target.purpose != "fit",
-                        states[done.get(number)])
-            for number, target in header.numbered.items()), **self._fixed(header),
-            **_gathered(progress))
+        self._show(step="plan", advice="These views are planned. Answer at the terminal.", lines=(),
+                   planned=tuple(
+                       PlannedView(number, self._reached(target.joints), target.purpose != "fit",
+                                   states[done.get(number)])
+                       for number, target in header.numbered.items()), **self._fixed(header))
 
     def approach(self, number: int) -> None:
         """Show that the arm is on its way to a view."""
