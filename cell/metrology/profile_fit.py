@@ -20,7 +20,7 @@ from cell.metrology.wall import Wall
 
 STEPS = 7
 SETTLED = 0.005       # px and shares: below, the fit has arrived
-FEW = 100             # rays tell which wall it is
+FEW = 100             # rays, or fewer, tell which wall it is
 THINNED = 2           # every second ray tells enough of blur and wall
 DARKEST, BRIGHTEST = -0.6, 1.3        # k
 NOTABLE_WALL = 1.5                    # px
@@ -74,15 +74,15 @@ def fit_profile(band: Band, rays: Mask, walls: list[Wall], *, doubled: bool = Tr
         doubled: whether two rims may show.
     """
     used = np.flatnonzero(rays)
-    few = band[used[::-(-len(used) // FEW)]]
+    few = band[used[::1 + len(used) // FEW]]
     best, least, chosen = np.zeros(11), np.inf, walls[0]
     for wall in walls:
         model = RimModel(few, wall)
         starts = [model.prior]
         if doubled and wall.widest > NOTABLE_WALL:
             starts.append(model.prior + model.onto_near_rim(wall))
-        if wall is not walls[0] and not doubled:
-            starts = [np.append(best[:6], model.prior[6:])]  # another wall, and else not far
+        if len(walls) == 2 and wall is walls[1]:  # its shade is another, and all else not far
+            starts = [np.append(best[:6], model.prior[6:])]
         for start in starts:
             state, misfit = _descend(model, few, start)
             if misfit < wall.worth * least:
