@@ -9,6 +9,8 @@ from pathlib import Path
 
 from cell.core.errors import DocumentError
 
+PICTURE = ".audit.rrd"  # what an audit drew beside a recording
+
 
 def new_log(folder: Path, job: str) -> Path:
     """Name a new recording, `<job>_<time>_<random>.rrd`, in a folder that can take it.
@@ -52,7 +54,9 @@ def choose_log(log: Path) -> Path:
     """
     if not log.is_dir():
         return log
-    found = sorted(log.glob("*.rrd"), key=lambda one: one.stat().st_mtime)
+    found = sorted((one for one in log.glob("*.rrd")
+                    if one.is_file() and not one.name.endswith(PICTURE)),
+                   key=lambda one: one.stat().st_mtime)
     if not found:
         raise DocumentError("there is no recording (.rrd) in this folder", source=str(log))
     return found[-1]

@@ -53,7 +53,7 @@ def test_a_disk_without_room_for_a_megabyte_is_refused(tmp_path):
 
 
 def test_of_a_folder_the_newest_recording_is_meant(tmp_path):
-    for age, name in enumerate(("b.rrd", "a.rrd", "c.html")):
+    for age, name in enumerate(("b.rrd", "a.rrd", "c.html", "a.audit.rrd")):
         (tmp_path / name).touch()
         os.utime(tmp_path / name, (age, age))
     assert choose_log(tmp_path) == tmp_path / "a.rrd"
