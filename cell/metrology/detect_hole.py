@@ -13,7 +13,7 @@ import numpy as np
 from cell.core.geometry import Array
 from cell.core.observation import Image
 from cell.core.optics import CameraModel
-from cell.metrology.arrays import Mask
+from cell.metrology.arrays import Indices, Mask
 from cell.metrology.band import SMOOTHING, Band, Patch, sample_band, spread
 from cell.metrology.edges import Edges, find_edges
 from cell.metrology.ellipse import Ellipse
@@ -25,10 +25,13 @@ from cell.metrology.gates import (
     check_inside,
     check_lit,
     check_round,
+    check_settled,
+    check_unclipped,
     check_whole,
+    clipped,
 )
 from cell.metrology.profile import Profile
-from cell.metrology.profile_fit import fit_profile, locate_edges
+from cell.metrology.profile_fit import fit_profile, locate_edges, uneven_blur
 from cell.metrology.reasons import refusal
 from cell.metrology.rim_fit import agree, settle
 from cell.metrology.spread import correlation_length, middle, robust_sigma
@@ -41,8 +44,11 @@ MANY = 0.87            # profiles an edge, below which two rims may show
 NOTICED = 0.7          # px of wall, below which its brightness makes no difference
 ROUGH_SPACING, SPACING = 3.0, 1.5  # px along the rim
 SHARP = 1.0            # px of blur by the lens, above which the edge itself may be rounded
+SOFT_DOUBT, SOFTEST = 6.0, 1.5  # px of ambiguity by each px beyond, and at most
 LIT_DOUBT, DARK_DOUBT = 0.5, 0.25  # of what a wall draws the edge by: a dark one is like another
 SMALL_ROUGHNESS = 0.25  # px from end to end, which texture alone gives
+EVEN, LIP = 0.06, 1.7   # px² that the blur's variance differs by all the same; lips beyond that
+CLIPPED_DOUBT = 0.6     # px, where white hides how high the step is
 
 
 def detect_hole(image: Image, camera: CameraModel, expected: Expected) -> Rim:
@@ -85,6 +91,8 @@ def detect_rim(image: Image, hole: Hole, camera: CameraModel, expected: Expected
     unrest = middle(misfit[rays])
     check_clear(abs(middle(height[rays])), unrest, profile.blur)
     good = rays & (misfit < 3.0 * unrest) & (np.abs(edge - profile.edge) < 2.0)
+    check_settled(good)
+    check_unclipped(band.grey[good])
     rim = _rim(band, edge, good, profile, hole)
     doubt = 0.0 if known else doubt_of_wall(walls[0], profile)
     return replace(rim, ambiguity=rim.ambiguity + doubt)
@@ -126,19 +134,23 @@ def _rim(band: Band, edge: Array, good: Mask, profile: Profile, hole: Hole) -> R
     major, minor, angle = ellipse.axes
     return Rim(points[kept], -normals[kept], robust_sigma(miss[kept]),
                correlation_length(miss[kept]), (x, y, major + bend, minor + bend, angle),
-               ambiguity=_ambiguity(edge[good] - profile.edge[good], profile),
+               ambiguity=_ambiguity(band, edge, ray, profile),
                blur=profile.blur, quality=_quality(hole, profile, good))
 
 
-def _ambiguity(ripple: Array, profile: Profile) -> float:
+def _ambiguity(band: Band, edge: Array, rays: Indices, profile: Profile) -> float:
     """Say how far the visible edge may lie beside the bore's (px): burr and die roll show as a
-    ragged or a soft edge, and a wall draws the edge inward by more or less than was thought.
+    ragged edge, a soft one, or one that is softer here than there; a wall draws the edge inward by
+    more or less than was thought; what is white may be of any height.
     """
-    low, high = np.quantile(ripple, [0.025, 0.975])
+    low, high = np.quantile((edge - profile.edge)[rays], [0.025, 0.975])
     soft = np.sqrt(max(profile.blur**2 - SMOOTHING**2, 0.0)) - SHARP
+    uneven = uneven_blur(band[rays], replace(profile, edge=edge)[rays])
+    ragged = max(high - low - SMALL_ROUGHNESS, LIP * np.sqrt(max(uneven - EVEN, 0.0)))
     pull = profile.wall_pull
     drawn = max(LIT_DOUBT * float(pull.max()), -DARK_DOUBT * float(pull.min()))
-    return float(max(high - low - SMALL_ROUGHNESS, 0.0) + np.clip(3.0 * soft, 0.0, 1.5) + drawn)
+    white = CLIPPED_DOUBT * float(clipped(band.grey[rays]).mean())
+    return float(max(ragged, min(SOFT_DOUBT * soft, SOFTEST), 0.0) + drawn + white)
 
 
 def _quality(hole: Hole, profile: Profile, good: Mask) -> dict[str, float]:

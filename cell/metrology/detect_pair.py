@@ -13,12 +13,13 @@ from cell.metrology.detect_hole import detect_rim
 from cell.metrology.detect_stripe import crosses, falls_into, follow_stripe
 from cell.metrology.features import Expected, Rim, Stripe
 from cell.metrology.find_holes import Hole, find_holes
-from cell.metrology.gates import COMPLETE, check_lit, why_no_hole
+from cell.metrology.gates import COMPLETE, LEAST_GAP, check_lit, is_white, why_no_hole
 from cell.metrology.reasons import Reason, refusal
-from cell.metrology.ridge import Ridge, find_ridges, runs_upright
+from cell.metrology.ridge import Ridge, find_ridges, ground_along, runs_upright, shows_in
 from cell.metrology.spread import middle
 
 FAINT = 0.2       # of the contrast of another hole in the same picture
+CLEAR, ALIKE = 3.0, 0.4  # times its ground: no scratch; of that in one image, in the other
 ANYWHERE = 100.0  # mm, the standard deviation of where a hole may be in the picture
 
 
@@ -33,6 +34,7 @@ def detect_pair(hole_image: Image, stripe_image: Image, sensor: SensorModel,
     ridges = find_ridges(stripe_image, upright=upright)
     if _brighter(stripe_image, hole_image) and find_ridges(hole_image, upright=upright):
         raise refusal("images_swapped")
+    ridges = [ridge for ridge in ridges if not _is_scratch(ridge, stripe_image, hole_image)]
     if not ridges:
         raise refusal("no_laser")
     check_lit(hole_image)
@@ -52,7 +54,8 @@ def _choose(ridges: list[Ridge], image: Image, sensor: SensorModel,
             if hole.coverage < COMPLETE:
                 _check_radius(ridge, image, sensor, expected)
             return ridge, hole, placed
-        reasons.append("laser_misses_hole" if beside else why_no_hole(image, ridge))
+        hidden = is_white(image) and ridge.gone.sum() >= LEAST_GAP
+        reasons.append("laser_misses_hole" if beside and not hidden else why_no_hole(image, ridge))
     _check_radius(ridges[0], image, sensor, expected)
     raise refusal(reasons[0])
 
@@ -67,6 +70,14 @@ def _check_radius(ridge: Ridge, image: Image, sensor: SensorModel, expected: Exp
         radius = hole.ellipse.radius * placed.centre[2] / sensor.camera.matrix[0, 0]
         raise refusal("radius_against_nominal",
                       f"about {radius:.1f} mm instead of {expected.radius:.1f}")
+
+
+def _is_scratch(ridge: Ridge, stripe_image: Image, hole_image: Image) -> bool:
+    """Tell whether a ridge is no laser but a scratch: no brighter against its ground than in the
+    hole image, where it shows as well.
+    """
+    clearness = ridge.height / ground_along(ridge, stripe_image)
+    return clearness < CLEAR and shows_in(ridge, hole_image) > ALIKE * clearness
 
 
 def _brighter(image: Image, other: Image) -> bool:

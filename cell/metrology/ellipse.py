@@ -76,6 +76,10 @@ class Ellipse:
         return Ellipse(self.centre + np.array([x, y]),
                        self.shape + np.array([[s00, s01], [s01, s11]]))
 
+    def scaled(self, factor: float) -> Ellipse:
+        """Make it so many times as large about its centre."""
+        return Ellipse(self.centre, factor * self.shape)
+
     def reach(self, points: ArrayLike) -> Array:
         """Measure where points (n, 2) lie: below 1 inside, 1 on the ellipse, above 1 outside."""
         inward = (np.asarray(points, dtype=np.float64) - self.centre) @ np.linalg.inv(self.shape)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cell.core.geometry import Array
 from cell.core.observation import Image
 from cell.metrology.arrays import Mask
 from cell.metrology.band import Band, sample_band, spread
@@ -27,6 +28,10 @@ CLEAR = 20.0     # times what the profiles leave unexplained
 TOO_SOFT = 3.0   # px of blur
 FLATTEST = 0.75  # minor over major axis: a tilt of 41 degrees
 RAGGED = 0.03    # of the radius, that edges may scatter
+CLIPPED = 0.8    # of the rim's sheet is white: the edge lies where the light blooms
+FEWEST_RAYS = 0.25  # of the profiles round a rim have to fit
+NEARBY = 0.5     # of the radius: where the rest of a rim lies that a small ellipse was fitted to
+BORDERING = 0.25  # of what is missing of a rim would lie beyond the image
 BESIDE = 0.1     # of the radius, inside and outside the rim, where hole and metal are looked at
 
 
@@ -51,6 +56,9 @@ def check_whole(image: Image, hole: Hole) -> None:
     edges = find_edges(band, hole.inside, 0.4 * hole.contrast)
     seen = edges[np.abs(edges.offset) < max(2.0, 0.03 * radius)].rays(RAYS)
     if seen[within(image, hole.ellipse, RAYS)].mean() < COMPLETE:
+        beyond = ~within(image, hole.ellipse.scaled(1.0 + NEARBY), RAYS)
+        if beyond[~seen].mean() > BORDERING:
+            raise refusal("hole_cut_by_border")
         raise refusal(_why_incomplete(band, seen, radius),
                       f"{seen.mean():.0%} of the rim follows an ellipse")
 
@@ -63,6 +71,24 @@ def check_clear(step: float, misfit: float, blur: float) -> None:
         raise refusal("too_dark", f"the edge is {step:.1f} grey values high, the rest {misfit:.1f}")
     if blur > TOO_SOFT:
         raise refusal("blurred", f"the edge is {blur:.1f} px wide")
+
+
+def check_settled(good: Mask) -> None:
+    """Refuse a rim that hardly any of its profiles (n,) fit."""
+    if good.mean() < FEWEST_RAYS:
+        raise refusal("not_round", f"{good.mean():.0%} of the profiles across its edge fit")
+
+
+def check_unclipped(grey: Array) -> None:
+    """Refuse a rim whose sheet is white nearly all round, from its profiles (n, m)."""
+    share = float(clipped(grey).mean())
+    if share > CLIPPED:
+        raise refusal("saturated", f"{share:.0%} of the rim borders on white")
+
+
+def clipped(grey: Array) -> Mask:
+    """Tell on which profiles (n, m) the sheet is white, as bright as a picture can show."""
+    return np.asarray(grey[:, -1] >= WHITE)
 
 
 def check_round(ellipse: Ellipse, spread_of_edges: float) -> None:
@@ -88,11 +114,16 @@ def _why_incomplete(band: Band, seen: Mask, radius: float) -> Reason:
     return "slot" if goes_on > covered else "half_occluded"
 
 
+def is_white(image: Image) -> bool:
+    """Tell whether most of a picture is white, so that an opening may not show."""
+    return bool((image >= WHITE).mean() > MOSTLY)
+
+
 def why_no_hole(image: Image, ridge: Ridge) -> Reason:
     """Say why a picture shows no round hole where the stripe passes: nothing at all, too much
     light, or an opening of another shape.
     """
-    if (image >= WHITE).mean() > MOSTLY:
+    if is_white(image):
         return "saturated"
     x, y = np.clip(np.rint(ridge.points(ridge.length)), 0, np.array(image.shape)[::-1] - 1).T
     grey = image[y.astype(int), x.astype(int)].astype(np.float64)

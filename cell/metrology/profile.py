@@ -13,6 +13,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from cell.core.geometry import Array
+from cell.metrology.arrays import Indices
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +26,10 @@ class Profile:
     blur: float
     width: Array
     share: Array
+
+    def __getitem__(self, rays: Indices) -> Profile:
+        """Return some of the rays."""
+        return Profile(self.edge[rays], self.blur, self.width[rays], self.share[rays])
 
     @property
     def wall_pull(self) -> Array:

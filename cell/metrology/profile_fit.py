@@ -25,6 +25,7 @@ THINNED = 2           # every second ray tells enough of blur and wall
 DARKEST, BRIGHTEST = -0.6, 1.3        # k
 NOTABLE_WALL = 1.5                    # px
 NARROWEST, WIDEST, USUAL_BLUR = 0.4, 6.0, 1.2  # px
+SECTORS = 12          # of a rim
 PIXELS_PER_ERROR = 30.0  # texture and smoothing: so many pixels go wrong together
 
 
@@ -129,3 +130,17 @@ def _nearer(band: Band, profile: Profile) -> tuple[Profile, Array, Array]:
     explained = move * (2.0 * pull - move * square) / len(band.offsets)
     return (replace(profile, edge=profile.edge + move), seen.height,
             np.sqrt(np.maximum(seen.misfit**2 - explained, 0.0)))
+
+
+def uneven_blur(band: Band, profile: Profile) -> float:
+    """Measure how the blur's variance (px²) differs from sector to sector of a rim.
+
+    The lens blurs a rim all round alike; the lip of a burr or of a die roll does not.
+    """
+    seen = compare(band.grey, shape_step(band.offsets, profile))
+    tie = seen.products[:, 0, 1] / np.maximum(seen.products[:, 0, 0], 1e-9)  # edges may move
+    sector = (band.t * (SECTORS / (2.0 * np.pi))).astype(np.intp)
+    pull = np.bincount(sector, seen.pulls[:, 1] - tie * seen.pulls[:, 0], SECTORS)
+    weight = np.bincount(sector, seen.products[:, 1, 1] - tie * seen.products[:, 0, 1], SECTORS)
+    told = weight > 0.1 * weight.mean()
+    return float(2.0 * profile.blur * np.std(pull[told] / weight[told]))

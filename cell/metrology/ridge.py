@@ -25,6 +25,7 @@ TOLERANCE = 2.5        # px, lens distortion over the length included
 SIGNIFICANCE = 6.0     # of a ridge above the image's own unrest
 PRESENT = 0.35          # of its usual height, to be seen on a line
 LEAST_SHARE = 0.15     # of the lines must carry the stripe
+BESIDE = 12            # px to either side, where a ridge's ground is looked at
 GOLDEN = 0.6180339887498949
 
 
@@ -89,6 +90,22 @@ def find_ridges(image: Image, *, upright: bool) -> list[Ridge]:
         found.append(replace(ridge, upright=upright))
         u, line, height = u[~near], line[~near], height[~near]
     return found
+
+
+def shows_in(ridge: Ridge, image: Image) -> float:
+    """Say how high a ridge stands in another image: grey, as a share of its ground there."""
+    turned = image if ridge.upright else np.ascontiguousarray(image.T)
+    height = _along(_response(turned), ridge.offset, ridge.slope)[ridge.strength >= PRESENT]
+    return float(np.median(height)) / ground_along(ridge, image)
+
+
+def ground_along(ridge: Ridge, image: Image) -> float:
+    """Give the usual grey beside a ridge, at least one."""
+    v = np.flatnonzero(~ridge.gone)
+    turned = image if ridge.upright else image.T
+    u = np.rint(ridge.across(v.astype(np.float64))).astype(np.intp)
+    beside = np.clip(np.stack([u - BESIDE, u + BESIDE]), 0, turned.shape[1] - 1)
+    return max(float(np.median(turned[v, beside])), 1.0)
 
 
 def _longest(response: Grey, u: Array, line: Array, height: Array) -> tuple[Mask, Ridge]:

@@ -95,7 +95,8 @@ def edge_drawing(images, truths, folder: Path):
         return None
     np.savez(folder / "images.npz", images=np.stack(images))
     script = Path(__file__).with_name("edge_drawing_peer.py")
-    out = subprocess.run([python, "-I", script, folder / "images.npz"], capture_output=True, check=True)
+    out = subprocess.run([python, "-I", script, folder / "images.npz"], capture_output=True,
+                         check=True)
     answers = json.loads(out.stdout)
     misses = [min(np.hypot(*(np.array(a["centre"]) - t)), FAR) if a["centre"] else FAR
               for a, t in zip(answers, truths, strict=True)]

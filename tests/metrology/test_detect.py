@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import cache
 
+import cv2
 import numpy as np
 import pytest
 from drawn_pictures import Scene, made_sensor
@@ -174,6 +175,44 @@ def test_a_burr_makes_the_edge_ambiguous():
     plain, ragged = (detect_hole(scene.hole_image(), scene.sensor.camera, scene.expected())
                      for scene in (clean, burred))
     assert ragged.ambiguity > plain.ambiguity + 0.5
+
+
+def test_an_edge_softer_on_one_side_is_ambiguous():
+    scene = Scene(noise=2.0, blur=0.6)
+    image = scene.hole_image()
+    lipped, left = cv2.GaussianBlur(image, (0, 0), 0.6), round(true_ellipse(scene).centre[0])
+    lipped[:, :left] = image[:, :left]
+    plain, uneven = (detect_hole(seen, scene.sensor.camera, scene.expected())
+                     for seen in (image, lipped))
+    assert uneven.ambiguity > plain.ambiguity + 0.3
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["nominals", "nothing known"])
+def test_a_rim_that_borders_on_white_all_round_is_saturated(known):
+    scene = Scene(plate=900.0, behind=20.0, wall=20.0)
+    with pytest.raises(UnmeasurableError) as refused:
+        detect_pair(scene.hole_image(), scene.stripe_image(), scene.sensor,
+                    scene.expected() if known else Expected())
+    assert refused.value.reason == "saturated"
+
+
+def test_a_scratch_that_both_pictures_show_is_no_stripe():
+    scene = Scene(stripe=0.0, ambient=20.0, noise=1.5)
+    pictures = scene.hole_image(), scene.stripe_image()
+    for picture in pictures:
+        ground = float(np.median(picture))
+        cv2.line(picture, (300, 20), (310, 300), 2.0 * ground, 3, cv2.LINE_AA)
+    with pytest.raises(UnmeasurableError) as refused:
+        detect_pair(*pictures, scene.sensor, scene.expected())
+    assert refused.value.reason == "no_laser"
+
+
+@pytest.mark.parametrize(("y", "radius"), [(11.6, 4.0), (12.4, 4.0), (12.0, 5.0), (-13.5, 5.0)])
+def test_a_hole_of_which_the_border_leaves_half_is_no_slot(y, radius):
+    scene = Scene(centre=(1.0, y, 244.0), radius=radius)
+    with pytest.raises(UnmeasurableError) as refused:
+        detect_pair(scene.hole_image(), scene.stripe_image(), scene.sensor, Expected())
+    assert refused.value.reason == "hole_cut_by_border"
 
 
 def test_the_spread_of_the_edges_is_that_of_the_noise():
