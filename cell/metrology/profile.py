@@ -79,7 +79,12 @@ def shape_edge(offsets: Array, profile: Profile) -> Array:
 
 
 def compare(grey: Array, step: Array) -> Comparison:
-    """Compare profiles (n, m) with a step and its slopes before it (n, p + 1, m)."""
+    """Compare profiles (n, m) with a step and its slopes before it (n, p + 1, m).
+
+    Of the signals on a ray only their products with each other are needed; what two levels explain
+    leaves them by taking the means out of the signals, then the step out of the products (an
+    elimination of Gauss).
+    """
     signals = np.concatenate([step, grey[:, None]], axis=1)
     signals -= np.einsum("nsm->ns", signals)[..., None] / grey.shape[1]  # short rows: fast so
     products = signals @ signals.swapaxes(1, 2)
