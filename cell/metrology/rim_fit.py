@@ -11,7 +11,7 @@ from cell.metrology.arrays import Indices, Mask
 from cell.metrology.band import Band
 from cell.metrology.edges import Edges
 from cell.metrology.ellipse import Ellipse
-from cell.metrology.spread import robust_sigma, tukey_weights
+from cell.metrology.spread import middle, robust_sigma, tukey_weights
 
 DRAWS = 256
 GOLDEN = 0.6180339887498949
@@ -60,7 +60,7 @@ def settle(band: Band, edges: Edges, *, floor: float,
     for _ in range(5):
         miss = edges.offset - rows @ step
         scale = max(floor, robust_sigma(miss))
-        weight = np.sqrt(tukey_weights(miss, scale))
+        weight = np.sqrt(tukey_weights(miss - middle(miss), scale))  # all may be off alike at first
         step = _solve(rows * weight[:, None], edges.offset * weight)
     return _moved(band.ellipse, step, free), edges.offset - rows @ step, scale
 

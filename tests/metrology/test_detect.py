@@ -9,12 +9,15 @@ import pytest
 from drawn_pictures import Scene, made_sensor
 
 from cell.core.errors import UnmeasurableError
+from cell.metrology.band import Band
 from cell.metrology.detect_hole import detect_hole
 from cell.metrology.detect_pair import detect_pair
 from cell.metrology.detect_stripe import detect_stripe
+from cell.metrology.edges import Edges
 from cell.metrology.ellipse import Ellipse, project_circle
 from cell.metrology.features import Expected
 from cell.metrology.reasons import REASONS
+from cell.metrology.rim_fit import settle
 
 LYING = made_sensor(upright=False)
 TILTED = {"tilt": (6.0, 5.0), "thickness": 2.0}
@@ -242,6 +245,16 @@ def test_an_ellipse_moves_as_its_design_says():
     shifts = ellipse.moved(step).points(t) - ellipse.points(t)
     outward = (shifts * ellipse.normals(t)).sum(axis=1)
     assert outward == pytest.approx(ellipse.design(t) @ step, abs=1e-9)
+
+
+def test_edges_that_all_lie_off_alike_are_followed():
+    start, rays = Ellipse.circle(40.0, 30.0, 20.0), np.arange(120)
+    turn = np.linspace(0.0, 2.0 * np.pi, 120, endpoint=False)
+    band = Band(start, turn, np.arange(-3.0, 4.0), np.zeros((120, 7)))
+    offset = 0.3 + 0.01 * np.random.default_rng(3).normal(size=120)
+    ellipse, miss, _ = settle(band, Edges(rays, offset, offset), floor=0.01)
+    assert abs(ellipse.radius - 20.3) < 0.005
+    assert np.abs(miss).max() < 0.05
 
 
 def test_a_projected_circle_is_the_camera_s_ellipse():
