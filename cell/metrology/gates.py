@@ -56,11 +56,19 @@ def check_whole(image: Image, hole: Hole) -> None:
     edges = find_edges(band, hole.inside, 0.4 * hole.contrast)
     seen = edges[np.abs(edges.offset) < max(2.0, 0.03 * radius)].rays(RAYS)
     if seen[within(image, hole.ellipse, RAYS)].mean() < COMPLETE:
-        beyond = ~within(image, hole.ellipse.scaled(1.0 + NEARBY), RAYS)
-        if beyond[~seen].mean() > BORDERING:
+        if _reaches_border(image, hole, band)[~seen].mean() > BORDERING:
             raise refusal("hole_cut_by_border")
         raise refusal(_why_incomplete(band, seen, radius),
                       f"{seen.mean():.0%} of the rim follows an ellipse")
+
+
+def _reaches_border(image: Image, hole: Hole, band: Band) -> Mask:
+    """Tell on which profiles (n,) a larger ellipse leaves the image where that shows the hole."""
+    points = hole.ellipse.scaled(1.0 + NEARBY).points(band.t)
+    nearest = np.clip(np.rint(points), 0, np.array(image.shape[::-1]) - 1).astype(np.intp)
+    inner, outer = (float(np.median(level)) for level in band.levels(BESIDE * hole.ellipse.radius))
+    border = image[nearest[:, 1], nearest[:, 0]] - (inner + outer) / 2.0
+    return (np.abs(points - nearest).max(axis=1) > 1.0) & (border * hole.inside > 0.0)
 
 
 def check_clear(step: float, misfit: float, blur: float) -> None:
