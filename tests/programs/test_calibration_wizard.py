@@ -156,6 +156,11 @@ def test_the_same_pictures_give_the_same_set_again(plant, finished):
     assert first.distance(second) < (0.005, 1e-4)
 
 
+def test_going_on_is_agreed_to(finished):
+    _, operator = finished
+    assert operator.heard("through the 14 views that are left") and operator.heard("way clear?")
+
+
 def test_a_concluded_session_cannot_be_gone_on_with(plant, finished):
     with pytest.raises(DocumentError, match="no open session of `all`"):
         run_wizard(Request("all", "demo", PLAN, plant, speed=20.0, resume=True), Scripted())

@@ -98,11 +98,16 @@ class Opening:
         used = [view for view in session.views
                 if view.status == "ok" and view.purpose != "sphere"]
         self.operator.tell(f"going on with {session.folder.name}: {len(used)} views are there")
+        self._agree_to_go_on(session, used)
         if used:
-            self._agree("The arm will drive to the last of them, to see that nothing has moved. Is "
-                        "the way clear?")
             self._check_old_view(used[-1], session)
         return session
+
+    def _agree_to_go_on(self, session: Session, used: Sequence[ViewRecord]) -> None:
+        left = len(session.header.targets) - len(session.views)
+        first = "to the last of them, to see that nothing has moved, then " if used else ""
+        self._agree(f"The arm will drive {first}through the {left} views that are left, at half "
+                    f"speed, and home. Is the way clear? (Keys then: {SAY_KEYS}.)")
 
     def _choose_boards(self) -> list[BoardDocument]:
         """The board to calibrate with; and the others, where the arm's own rows are wanted."""
