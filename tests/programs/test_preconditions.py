@@ -70,6 +70,16 @@ def test_a_difference_from_the_set_needs_a_typed_reason(belief, identity, change
     assert accept_preconditions(tuple(lines.values()), "in the plan", Scripted()) == "in the plan"
 
 
+def test_checksums_are_shown_short_and_compared_whole(belief, identity):
+    long = "0123456789" * 4
+    robot = belief.hand_eye.robot.model_copy(update={"kinematics_checksum": long})
+    other = replace(belief, hand_eye=belief.hand_eye.model_copy(update={"robot": robot}))
+    lines = [check(other, replace(identity, kinematics_checksum=found))["kinematics"]
+             for found in (long, long.replace("90123456789012", "90123456x89012"))]
+    assert [one.verdict for one in lines] == ["pass", "warn"]
+    assert {one.found for one in lines} == {"01234567...23456789"}
+
+
 def test_the_light_plane_alone_would_keep_the_hand_eye_of_another_robot(belief, identity):
     lines = check(belief, replace(identity, payload_kg=4.5), what="light-plane")
     assert lines["payload"].verdict == "refuse"

@@ -7,7 +7,7 @@ they are compared with the cell's file and with the active set, and a difference
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from datetime import date
 from pathlib import Path
 from typing import Literal
@@ -83,9 +83,9 @@ def _robot(what: str, belief: Belief, found: RobotIdentity) -> Iterator[Precondi
     if found.serial != record.serial or settings.serial is None:
         yield _same("serial of the set", found.serial, record.serial, other, f"{advice}: has the "
                     "robot been exchanged?")
-    yield _same("kinematics", _short(found.kinematics_checksum),
-                _short(record.kinematics_checksum or found.kinematics_checksum), other,
-                f"{advice}: has the arm been repaired or calibrated?")
+    yield _same("kinematics", found.kinematics_checksum,
+                record.kinematics_checksum or found.kinematics_checksum, other,
+                f"{advice}: has the arm been repaired or calibrated?", _short)
     tcp = bool(np.allclose(found.tcp_offset, record.tcp_offset, rtol=0.0, atol=TCP_TOLERANCE))
     yield Precondition(item="TCP offset", found=_row(found.tcp_offset),
                        wanted=_row(record.tcp_offset), verdict="pass" if tcp else other,
@@ -148,10 +148,11 @@ def _temperatures_in(views: Path) -> list[float]:
         return []
 
 
-def _same(item: str, found: str, wanted: str, otherwise: Verdict, advice: str) -> Precondition:
-    if found == wanted:
-        return Precondition(item=item, found=found, wanted=wanted)
-    return Precondition(item=item, found=found, wanted=wanted, verdict=otherwise, advice=advice)
+def _same(item: str, found: str, wanted: str, otherwise: Verdict, advice: str,
+          shown: Callable[[str], str] = str) -> Precondition:
+    line = Precondition(item=item, found=shown(found), wanted=shown(wanted))
+    return line if found == wanted else line.model_copy(update={"verdict": otherwise,
+                                                                "advice": advice})
 
 
 def _short(checksum: str) -> str:
