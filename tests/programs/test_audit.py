@@ -137,6 +137,8 @@ def test_an_altered_recording_is_refused_and_the_chain_finds_it_even_unsealed(fo
     (lambda hole: {"index": 9}, "says that it is number 9, and is number 0"),
     (lambda hole: {"attempts": (replace(hole.attempts[0], views=9),)}, "after [9] of 2 views"),
     (lambda hole: {"attempts": (replace(hole.attempts[0], views=0),)}, "after [0] of 2 views"),
+    (lambda hole: {"attempts": (hole.attempts[0], replace(hole.attempts[0], views=9))},
+     "after [2, 9] of 2 views"),
     (lambda hole: {"observation": replace(hole.observation, hole_id="XX")},
      "not in the job's plan"),
 ])

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 from cell.core.documents.papers import Papers
 from cell.core.documents.record import HoleRecord, Stop
@@ -38,7 +39,8 @@ def _of_a_hole(at: int, record: HoleRecord) -> Iterator[str]:
     views, ends = len(record.observation.views), [attempt.views for attempt in record.attempts]
     if record.index != at:
         yield f"says that it is number {record.index}, and is number {at}"
-    if ends != ([0] if views == 0 else sorted({*ends, views} - {0})):
+    rising = all(first < second for first, second in pairwise([0, *ends]))
+    if not (rising and ends[-1:] == [views] if views else ends == [0]):
         yield f"its attempts end after {ends} of {views} views"
     elif views == 0 and not isinstance(record.outcome, NotMeasured):
         yield "has a measurement and no view"
