@@ -9,11 +9,10 @@ from math import inf, isfinite
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rich.box import SIMPLE
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from cell.cli.words import answers
+from cell.cli.words import Answers, answers
 
 if TYPE_CHECKING:
     from cell.programs.audit.compare import Difference
@@ -60,7 +59,7 @@ def print_change(audit: LogAudit) -> None:
 
 def _print_table(table: Table) -> None:
     """Give a table the room that it needs where no screen sets a width."""
-    (answers if answers.is_terminal else Console(width=WIDE)).print(table)
+    (answers if answers.is_terminal else Answers(width=WIDE)).print(table)
 
 
 def print_row(audits: Sequence[LogAudit], folders: Sequence[FolderAudit]) -> None:

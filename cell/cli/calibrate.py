@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import getpass
 import math
 from dataclasses import dataclass
 from enum import StrEnum
@@ -15,7 +14,7 @@ from rich.table import Table
 from cell.cli.calibrate_cell import SPEED, YES, body, check
 from cell.cli.calibrate_operator import operator_of
 from cell.cli.calibrate_sets import CELL, FOLDER, JSON, activate, diff, history, rollback
-from cell.cli.words import answers, console, print_json
+from cell.cli.words import answers, console, print_json, user_name
 
 if TYPE_CHECKING:
     from cell.core.documents.calibration_session import What
@@ -78,7 +77,7 @@ def camera(cell: str = CELL, plan: Path | None = PLAN, yes: bool = YES, resume: 
            as_json: bool = JSON) -> None:
     """Calibrate the camera alone, for a look: a set needs light plane and hand-eye too (`all`).
 
-    Exit code: 0 accepted, 1 refused, 2 bad input, 3 device fault.
+    Exit code: 0 accepted, 1 refused, 2 bad input or stopped, 3 device fault.
     """
     _run("camera", Asked(cell, plan, yes, resume, speed, folder, live, as_json))
 
@@ -89,7 +88,7 @@ def light_plane(cell: str = CELL, plan: Path | None = PLAN, yes: bool = YES, res
                 as_json: bool = JSON) -> None:
     """Calibrate the light plane with the active camera; makes a set.
 
-    Exit code: 0 accepted, 1 refused, 2 bad input, 3 device fault.
+    Exit code: 0 accepted, 1 refused or not accepted, 2 bad input or stopped, 3 device fault.
     """
     _run("light-plane", Asked(cell, plan, yes, resume, speed, folder, live, as_json))
 
@@ -110,7 +109,8 @@ def everything(cell: str = CELL, plan: Path | None = PLAN, yes: bool = YES, resu
 
     With `--plan FILE --yes` nobody is asked. A session that was cut off goes on with `--resume`.
 
-    Exit code: 0 accepted, 1 refused (with reasons), 2 bad input, 3 device fault.
+    Exit code: 0 accepted, 1 refused (with reasons) or not accepted, 2 bad input or stopped, 3
+    device fault.
     """
     _run("all", Asked(cell, plan, yes, resume, speed, folder, live, as_json))
 
@@ -134,7 +134,8 @@ def hand_eye(
     camera_from_board.csv for poses alone. It is diagnosed before it is solved: units, conventions,
     exchanged lists, a moved board, doubtful intrinsics are named, never corrected.
 
-    Exit code: 0 accepted, 1 refused (with reasons), 2 bad input.
+    Exit code: 0 accepted, 1 refused (with reasons) or not accepted, 2 bad input or stopped, 3
+    device fault.
     """
     if recorded is None:
         _run("hand-eye", Asked(cell, plan, yes, resume, speed, folder, live, as_json))
@@ -163,7 +164,7 @@ def _run(what: What, asked: Asked) -> None:
     from cell.programs.calibration.wizard import Request, run_wizard
 
     plan = (parse(CalibrationPlan, read_text(asked.plan), str(asked.plan)) if asked.plan
-            else CalibrationPlan() if asked.yes else CalibrationPlan(operator=getpass.getuser()))
+            else CalibrationPlan() if asked.yes else CalibrationPlan(operator=user_name()))
     request = Request(what, asked.cell, plan, asked.folder, asked.speed, asked.resume, asked.live)
     with operator_of(asked.yes) as operator:
         finished = run_wizard(request, operator)

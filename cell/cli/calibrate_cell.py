@@ -90,10 +90,10 @@ def _as_json(done: CheckedCell) -> dict[str, Any]:
 
 
 def _warmth(done: CheckedCell) -> str:
-    coldest, warmest = min(done.temperatures), max(done.temperatures)
-    camera = done.camera_temperature
+    joints, camera = done.temperatures, done.camera_temperature
+    arm = f"{min(joints):.0f} to {max(joints):.0f} degrees C" if joints else "unknown"
     seen = "unknown" if camera is None else f"{camera:.0f} degrees C"
-    return f"joints {coldest:.0f} to {warmest:.0f} degrees C, camera {seen}"
+    return f"joints {arm}, camera {seen}"
 
 
 def _in_words(done: CheckedCell) -> str:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import getpass
 from datetime import UTC, datetime
 from pathlib import Path
 
 import typer
 from rich.table import Table
 
-from cell.cli.words import answers, print_json
+from cell.cli.words import answers, print_json, user_name
 
 CELL = typer.Option("demo", "--cell", help="The cell, a folder of calibration/.")
 FOLDER = typer.Option(Path("calibration"), "--calibration", help="Where the cells' folders lie.")
@@ -45,7 +44,7 @@ def activate(set_id: str = typer.Argument(..., metavar="SET"), cell: str = CELL,
     from cell.archive import activation
     from cell.archive.sets import cell_folder
 
-    active = activation.activate(cell_folder(calibration, cell), set_id, by=by or getpass.getuser(),
+    active = activation.activate(cell_folder(calibration, cell), set_id, by=by or user_name(),
                                  at=_now(), reason=reason)
     answers.print(f"active: {active.set}, before it {active.previous}", highlight=False)
 
@@ -60,7 +59,7 @@ def rollback(set_id: str | None = typer.Argument(None, metavar="[SET]"), cell: s
     from cell.archive.sets import cell_folder
 
     active = activation.rollback(cell_folder(calibration, cell), set_id,
-                                 by=by or getpass.getuser(), at=_now(), reason=reason)
+                                 by=by or user_name(), at=_now(), reason=reason)
     answers.print(f"active: {active.set}, before it {active.previous}", highlight=False)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import getpass
 import json
 import os
 import shutil
@@ -40,6 +41,14 @@ console = Console(stderr=True)
 """For people: progress, and what went wrong."""
 
 answers = Answers(width=max(NARROWEST, shutil.get_terminal_size().columns))
+
+
+def user_name() -> str:
+    """Return who is logged in; `unknown` for a user id without an account, as in a container."""
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):  # Python until 3.12, from 3.13
+        return "unknown"
 
 
 def print_json(answer: dict[str, Any]) -> None:

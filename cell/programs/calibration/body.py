@@ -141,7 +141,7 @@ def _conclude(request: BodyRequest, prepared: Prepared, datums: list[Datum],
     verdict = worst(gate.verdict for gate in gates)
     for gate in gates:
         operator.tell(f"  {gate.verdict:6} {gate.meaning}: {gate.value:.3g}, wanted {gate.limit}")
-    if registration.chi2 is not None and registration.chi2 < MODEST:
+    if registration.chi2 is not None and 0.0 < registration.chi2 < MODEST:
         operator.tell(f"The datums agree {registration.chi2 ** -0.5:.0f} times better than their "
                       "uncertainty says: the robot's share is a bound over all its reach, not over "
                       "this body.")
