@@ -118,3 +118,11 @@ def plan_of(hole, normal_sigma, rng, radius_sigma=0.03):
     """What a plan knows of a hole: a normal and a radius that are a little off."""
     return Expected(normal=waver(hole.normal, normal_sigma, rng), normal_sigma=normal_sigma,
                     radius=hole.radius + rng.normal(0.0, radius_sigma))
+
+
+def conic_of_circle(centre, normal, radius):
+    """Project a circle (centre and normal (3,) in the camera frame, mm) to its conic (3, 3)."""
+    c, n = np.asarray(centre), np.asarray(normal) / np.linalg.norm(normal)
+    # A ray u meets the plane in X = u (n·c)/(n·u); |X - c| = r becomes quadratic in u.
+    back = (n @ c) * np.eye(3) - np.outer(c, n)
+    return back.T @ back - radius**2 * np.outer(n, n)

@@ -8,7 +8,6 @@ has no direction in which it is singular, unlike y = k x + l (paper, equation 4)
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from cell.core.geometry import Array
 from cell.metrology.reasons import refusal
@@ -43,15 +42,6 @@ def fit_conic(points: Array) -> Array:
     if np.linalg.det(conic[:2, :2]) <= 0:
         raise refusal("not_round", "the conic through the rim's points is no ellipse")
     return np.asarray(conic * np.sign(np.trace(conic[:2, :2])))
-
-
-def conic_of_circle(centre: ArrayLike, normal: ArrayLike, radius: float) -> Array:
-    """Project a circle (centre and normal (3,) in the camera frame, mm) to its conic (3, 3)."""
-    c, n = np.asarray(centre, dtype=np.float64), np.asarray(normal, dtype=np.float64)
-    n = n / np.linalg.norm(n)
-    # A ray u meets the plane in X = u (n·c)/(n·u); |X - c| = r becomes quadratic in u.
-    back = float(n @ c) * np.eye(3) - np.outer(c, n)
-    return np.asarray(back.T @ back - radius**2 * np.outer(n, n))
 
 
 def ellipse_centre(conic: Array) -> Array:

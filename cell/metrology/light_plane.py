@@ -65,11 +65,6 @@ class LightPlaneResult:
         """The largest standard uncertainty (rad) of the normal's direction."""
         return float(np.sqrt(np.linalg.eigvalsh(self.covariance[:3, :3])[-1]))
 
-    def sigma_at(self, point: Array) -> float:
-        """Predict the standard uncertainty (mm) of the plane at a point (3,) near it."""
-        row = np.append(point, 1.0)
-        return float(np.sqrt(row @ self.covariance @ row))
-
 
 def solve_light_plane(stripes: Sequence[StripeOnBoard], camera: CameraModel) -> LightPlaneResult:
     """Solve the plane from the stripe on a board in four poses or more.

@@ -35,10 +35,3 @@ def approved(database: Database, hashes: Sequence[str]) -> bool:
             select(func.count()).select_from(approvals)
             .where(approvals.c.hash.in_(hashes), approvals.c.withdrawn_at.is_(None))).scalar_one()
     return found == len(set(hashes))
-
-
-def list_approvals(database: Database) -> list[Row]:
-    """List every approval ever given, the latest first."""
-    with database.transaction() as connection:
-        found = connection.execute(select(approvals).order_by(approvals.c.approved_at.desc()))
-        return [dict(row) for row in found.mappings()]

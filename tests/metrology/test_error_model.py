@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from made_points import ALPHA, SENSOR_A, SENSOR_B, L
+from made_points import ALPHA, SENSOR_A, SENSOR_B, L, conic_of_circle
 
-from cell.metrology.conic import conic_of_circle, ellipse_centre
+from cell.metrology.conic import ellipse_centre
 from cell.metrology.error_model import (
     Ranges,
     SensorGeometry,

@@ -50,7 +50,8 @@ def test_the_plane_and_what_it_is_said_to_be_worth(views):
     for pixel in ([384.0, 288.0], [384.0, 60.0], [384.0, 500.0]):
         point = TRUTH.light_plane.meet(TRUTH.camera.rays(np.array(pixel)))
         miss = abs(float(result.plane.distance(point)))
-        assert miss < max(0.02, 5.0 * result.sigma_at(point))
+        row = np.append(point, 1.0)
+        assert miss < max(0.02, 5.0 * np.sqrt(row @ result.covariance @ row))
 
 
 def test_camera_and_plane_found_together_agree_although_the_focal_length_is_a_little_off(views):

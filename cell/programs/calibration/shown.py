@@ -5,7 +5,6 @@ from __future__ import annotations
 from base64 import b64decode
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -126,11 +125,6 @@ class Shown:
 
     def _camera(self, view: View) -> Transform:
         return self._belief.chain.base_from_camera(view.base_from_flange_before, view.joints)
-
-
-def session_name(folder: Path) -> str:
-    """Name a session for the live view: its cell and its folder."""
-    return f"{folder.parent.parent.name}_{folder.name}"
 
 
 def _gathered(progress: Progress) -> dict[str, Any]:
