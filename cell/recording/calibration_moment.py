@@ -85,7 +85,7 @@ class CalibrationMoment:
     sphere: tuple[Array, float] | None = None
     planned: tuple[PlannedView, ...] = ()
     corners: Array = field(default_factory=no_pixels)
-    leans: Array = field(default_factory=no_pixels)
+    leans: Array = field(default_factory=lambda: np.zeros((0, 3)))
     figures: tuple[tuple[str, float], ...] = ()
     predicted: float = float("nan")
     goal: float = float("nan")

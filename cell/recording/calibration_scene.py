@@ -179,8 +179,7 @@ def _pyramid(view: PlannedView, camera: CameraModel) -> Array:
 
 def _draw_leans(leans: Array) -> Iterator[Drawing]:
     """Draw a point for how each view leaned, with a stroke the way that it was rolled."""
-    rows = leans.reshape(-1, 3)
-    middles, rolls = rows[:, :2], np.radians(rows[:, 2])
+    middles, rolls = leans[:, :2], np.radians(leans[:, 2])
     ends = TICK_DEG * np.column_stack([np.cos(rolls), np.sin(rolls)])
     yield LEANS, rr.LineStrips2D([[middle, middle + end] for middle, end
                                   in zip(middles, ends, strict=True)], colors=[STATES["taken"]],

@@ -68,7 +68,6 @@ def shoot_ring(station: Station) -> View:
                 station.robot.state().base_from_flange, before.joints, 0)
 
 
-
 def record(session: Session, number: int, shots: Shots, corners: int,
            status: str) -> ViewRecord:
     """Write a view to the disk: pictures first, then its line; earlier takes of it stay.
