@@ -53,7 +53,8 @@ def print_change(audit: LogAudit) -> None:
     answers.print(f"{escape(audit.body_id):<24} {began:%Y-%m-%d %H:%M} UTC  "
                   f"[{COLOURS[audit.answer]}]{audit.answer:<7}[/]  "
                   f"{_plain(audit.verdict)} -> {_plain(audit.verdict_then)}"
-                  f"  {escape(', '.join(audit.turning))}", highlight=False, soft_wrap=True)
+                  f"  {escape(', '.join(audit.turning))}{_skipped(audit)}",
+                  highlight=False, soft_wrap=True)
     return None
 
 
@@ -118,7 +119,7 @@ def _lines(audit: LogAudit) -> list[str]:
     lines = [f"{sum(audit.numbers.values())} numbers of {audit.holes} holes: {', '.join(counts)}"
              ] if counts else []
     if audit.skipped:
-        lines.append(f"[yellow]{audit.skipped} holes without their images: not measured again[/]")
+        lines.append(_skipped(audit).strip())
     lines += [f"[yellow]{escape(warning)}[/]" for warning in audit.warnings]
     lines += [f"{name}: {escape(was)} then, {escape(here)} here"
               for name, (was, here) in audit.versions.items()]
@@ -126,6 +127,11 @@ def _lines(audit: LogAudit) -> list[str]:
         lines.append(f"verdict {_plain(audit.verdict)}, {'would be' if audit.what_if else 'now'} "
                      f"{_plain(audit.verdict_then)}")
     return lines
+
+
+def _skipped(audit: LogAudit) -> str:
+    return (f"  [yellow]{audit.skipped} holes without their images: not measured again[/]"
+            if audit.skipped else "")
 
 
 def _differences(audit: LogAudit) -> Table:

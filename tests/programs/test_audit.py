@@ -219,6 +219,15 @@ def test_what_if_the_tolerances_were_tighter(log):
     assert audit.exit_code() == 1
 
 
+def test_a_body_that_turns_without_any_feature_changes(log):
+    job = yaml.safe_load(measured_anew()[0].papers["job"])
+    job["stops"] = [stop for stop in job["stops"] if stop["hole"] != "SI3"]
+    audit = audit_log(log, Question(what_if=WhatIf({"job": json.dumps(job)})))
+    assert (audit.verdict, audit.verdict_then, audit.turning) == (
+        "out_of_tolerance", "in_tolerance", ())
+    assert (audit.answer, audit.exit_code()) == ("changes", 1)
+
+
 def test_both_results_are_saved_over_the_same_image_where_they_differ(folder):
     true = measured_anew()[1][0].outcome
     log = record_body(folder / "shown.rrd", holes=with_outcome(0, diameter=true.diameter + 0.05))

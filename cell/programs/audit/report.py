@@ -12,7 +12,7 @@ from cell.programs.audit.compare import Difference
 from cell.recording.integrity import Check
 
 Answer: TypeAlias = Literal["identical", "reproduced", "differs", "refused", "stays", "changes"]
-"""The last two are those of a what-if: whether a verdict does."""
+"""The last two are those of a what-if: whether a verdict does, a feature's or the body's."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,8 @@ class LogAudit:
         if self.problem is not None:
             return "refused"
         if self.what_if:
-            return "changes" if self.turning else "stays"
+            turns = self.turning or self.verdict != self.verdict_then
+            return "changes" if turns else "stays"
         if self.numbers["differs"]:
             return "differs"
         return "reproduced" if self.numbers["reproduced"] else "identical"
