@@ -59,8 +59,8 @@ def audit(
     The recordings are tamper-evident: it shows who changed what after the seal, not who held the
     key, nor that the newest bodies were removed (compare the newest head with one kept elsewhere).
 
-    Exit code: 0 identical, reproduced or, under a what-if, the same verdicts; 1 something differs or a
-    verdict changes; 2 unreadable or not intact.
+    Exit code: 0 identical or reproduced, 1 something differs, 2 unreadable or not intact. Under a
+    what-if: 0 all verdicts stay, 1 one changes.
     """
     from cell.programs.audit.gather import gather_logs, parse_since, read_what_if, started_since
     from cell.programs.audit.question import Question
