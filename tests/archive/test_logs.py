@@ -6,6 +6,7 @@ import pytest
 
 from cell.archive.logs import check_logs, choose_log, new_log
 from cell.core.errors import DocumentError
+from cell.recording.audit_picture import SUFFIX
 
 
 def test_a_log_is_named_by_time_and_chance(tmp_path):
@@ -53,7 +54,7 @@ def test_a_disk_without_room_for_a_megabyte_is_refused(tmp_path):
 
 
 def test_of_a_folder_the_newest_recording_is_meant(tmp_path):
-    for age, name in enumerate(("b.rrd", "a.rrd", "c.html", "a.audit.rrd")):
+    for age, name in enumerate(("b.rrd", "a.rrd", "c.html", f"a{SUFFIX}")):
         (tmp_path / name).touch()
         os.utime(tmp_path / name, (age, age))
     assert choose_log(tmp_path) == tmp_path / "a.rrd"
