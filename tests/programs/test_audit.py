@@ -179,6 +179,11 @@ def test_a_pruned_recording_keeps_its_chain_and_says_what_it_lost(folder):
     assert (audit.answer, audit.skipped, audit.holes) == ("identical", 3, 3)
     assert audit.chain == audit_log(log).chain
     assert {check.level: check.passed for check in audit.checks}["images"] is None
+    measured = audit_log(pruned, Question(what_if=WhatIf(method="two-step")))
+    assert (measured.answer, measured.exit_code()) == ("refused", 2)
+    assert measured.problem == "3 holes cannot be measured otherwise: their images were pruned"
+    nominals = read(log).start.papers["nominals"].replace(",2.0,2.0,2.0,", ",0.1,2.0,2.0,")
+    assert "BP2" in audit_log(pruned, Question(what_if=WhatIf({"nominals": nominals}))).turning
 
 
 def test_something_else_than_a_recording_is_refused_in_one_sentence(tmp_path):

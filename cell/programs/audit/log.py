@@ -28,6 +28,8 @@ from cell.recording.pages import Page, read_pages, without_images
 from cell.recording.seal import Closed, Seal
 from cell.recording.versions import collect_versions
 
+JUDGING = ("job", "nominals")  # papers of a what-if that judge what was measured
+
 Watch: TypeAlias = Callable[[int], None]
 """Told how many holes are through."""
 
@@ -87,6 +89,9 @@ class _Audit:
         self._papers = question.papers(first.record)
         self._plan = (Papers.parse(self._start.papers, self._start.set_id) if self._what_if
                       else self._papers)
+        self._measures_otherwise = self._papers.job.method != self._plan.job.method or any(
+            self._start.papers.get(name) != text
+            for name, text in question.what_if.texts.items() if name not in JUDGING)
         self._known = {hole.id for hole in self._papers.holes}
         self._page, self._faults, self._missing = first, list(first.faults), 0
         self._recorded: list[HoleRecord] = []
@@ -125,12 +130,19 @@ class _Audit:
         checks = [*checks, check_chain(seal, found, self._faults),
                   check_images(seal, self._missing), self._check_records()]
         return LogAudit(
-            log, _not_intact(checks[-3:]), self._start.body_id, self._start.started, status,
-            self._page.chain, len(self._recorded), tuple(checks), self._numbers,
+            log, _not_intact(checks[-3:]) or self._unanswered(),
+            self._start.body_id, self._start.started, status, self._page.chain,
+            len(self._recorded), tuple(checks), self._numbers,
             tuple(self._differences), _versions_that_differ(self._start), tuple(self._warnings),
             self._skipped, recorded.verdict if recorded is not None else None, then.verdict,
             _changes(recorded, then) if recorded is not None and self._what_if else (),
             self._what_if)
+
+    def _unanswered(self) -> str | None:
+        """Say why a what-if that measures otherwise has no answer: there are no images."""
+        if self._skipped and self._measures_otherwise:
+            return f"{self._skipped} holes cannot be measured otherwise: their images were pruned"
+        return None
 
     def _check_records(self) -> Check:
         wrong = list(contradictions(self._plan, self._recorded, self._stop))
