@@ -19,6 +19,10 @@ from cell.programs.calibration.chain import Chain
 from cell.programs.calibration.seen import SeenView
 
 
+PLACES = 2  # of boards, at least
+GAIN = 0.9  # of what the views kept apart have without, at most: less is chance
+
+
 @dataclass(frozen=True, eq=False)
 class KinematicsFound:
     """The estimate from boards in so many `places`, and how still (mm, rms) they stood without and
@@ -33,8 +37,10 @@ class KinematicsFound:
 
     @property
     def useful(self) -> bool:
-        """Whether the views kept apart gain."""
-        return self.apart_with < self.apart_without
+        """Whether the views kept apart gain, and boards in several places stand behind it: from one
+        place the arm's rows are hardly told from the camera's mount.
+        """
+        return self.places >= PLACES and self.apart_with < GAIN * self.apart_without
 
     def __str__(self) -> str:
         return (f"kinematics, boards in {self.places} place{'s' * (self.places > 1)}: views kept "
