@@ -18,7 +18,6 @@ from cell.programs.calibration.capture import as_six
 from cell.programs.calibration.chain import Chain
 from cell.programs.calibration.seen import SeenView
 
-
 PLACES = 2  # of boards, at least
 GAIN = 0.9  # of what the views kept apart have without, at most: less is chance
 
