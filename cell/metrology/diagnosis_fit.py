@@ -48,7 +48,7 @@ class CameraCheck:
 
 
 def check_camera(session: HandEyeSession, sound: HandEyeSession) -> CameraCheck | None:
-    """Calibrate the camera from the session's own corners and compare; None where they are few.
+    """Calibrate the camera from the session's own corners and compare; None where they do not tell.
 
     A view whose robot pose is wrong still tells of the camera: how still the board stands is judged
     by the `sound` views alone.
@@ -60,11 +60,13 @@ def check_camera(session: HandEyeSession, sound: HandEyeSession) -> CameraCheck 
         again = sound.with_camera(own.camera)
     except (UnmeasurableError, np.linalg.LinAlgError):
         return None
+    variances = np.diag(own.covariance)[:4]
+    if variances.min() <= 0.0:  # corners that contradict each other leave no minimum
+        return None
     step = (own.camera.matrix - session.camera.matrix)[[0, 1, 0, 1], [0, 1, 2, 2]]
-    sigmas = np.sqrt(np.diag(own.covariance))[:4]
     return CameraCheck(own, _better(session, own),
                        float(np.abs(step).max() / session.camera.matrix[0, 0]),
-                       float(np.abs(step / sigmas).max()),
+                       float(np.abs(step / np.sqrt(variances)).max()),
                        session.pnp_rms_px, _still(sound), _still(again))
 
 
