@@ -45,7 +45,7 @@ NOTICED = 0.7          # px of wall, below which its brightness makes no differe
 ROUGH_SPACING, SPACING = 3.0, 1.5  # px along the rim
 SHARP = 1.0            # px of blur by the lens, above which the edge itself may be rounded
 SOFT_DOUBT, SOFTEST = 6.0, 1.5  # px of ambiguity by each px beyond, and at most
-LIT_DOUBT, DARK_DOUBT = 0.5, 0.25  # of what a wall draws the edge by: a dark one is like another
+LIT_DOUBT, DARK_DOUBT = 0.4, 0.25  # of what a wall draws an edge by: a dark one is like another
 SMALL_ROUGHNESS = 0.25  # px from end to end, which texture alone gives
 EVEN, LIP = 0.06, 1.7   # px² that the blur's variance differs by all the same; lips beyond that
 CLIPPED_DOUBT = 0.6     # px, where white hides how high the step is
@@ -134,23 +134,27 @@ def _rim(band: Band, edge: Array, good: Mask, profile: Profile, hole: Hole) -> R
     major, minor, angle = ellipse.axes
     return Rim(points[kept], -normals[kept], robust_sigma(miss[kept]),
                correlation_length(miss[kept]), (x, y, major + bend, minor + bend, angle),
-               ambiguity=_ambiguity(band, edge, ray, profile),
+               ambiguity=_ambiguity(band, edge, ray, profile), drawn=_drawn(profile[ray[kept]]),
                blur=profile.blur, quality=_quality(hole, profile, good))
 
 
 def _ambiguity(band: Band, edge: Array, rays: Indices, profile: Profile) -> float:
     """Say how far the visible edge may lie beside the bore's (px): burr and die roll show as a
-    ragged edge, a soft one, or one that is softer here than there; a wall draws the edge inward by
-    more or less than was thought; what is white may be of any height.
+    ragged edge, a soft one, or one that is softer here than there; what is white may be of any
+    height.
     """
     low, high = np.quantile((edge - profile.edge)[rays], [0.025, 0.975])
     soft = np.sqrt(max(profile.blur**2 - SMOOTHING**2, 0.0)) - SHARP
     uneven = uneven_blur(band[rays], replace(profile, edge=edge)[rays])
     ragged = max(high - low - SMALL_ROUGHNESS, LIP * np.sqrt(max(uneven - EVEN, 0.0)))
-    pull = profile.wall_pull
-    drawn = max(LIT_DOUBT * float(pull.max()), -DARK_DOUBT * float(pull.min()))
     white = CLIPPED_DOUBT * float(clipped(band.grey[rays]).mean())
-    return float(max(ragged, min(SOFT_DOUBT * soft, SOFTEST), 0.0) + drawn + white)
+    return float(max(ragged, min(SOFT_DOUBT * soft, SOFTEST), 0.0) + white)
+
+
+def _drawn(profile: Profile) -> Array:
+    """Say how far (n,) px the wall may draw each edge otherwise than was thought."""
+    pull = profile.wall_pull
+    return np.where(pull > 0.0, LIT_DOUBT, DARK_DOUBT) * pull
 
 
 def _quality(hole: Hole, profile: Profile, good: Mask) -> dict[str, float]:

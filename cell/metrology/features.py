@@ -34,8 +34,9 @@ class Rim:
     `points` (n, 2) px on the edge, `directions` (n, 2) unit, from the metal into the hole.
     `sigma` px is the standard deviation of one point along its direction as measured in this image,
     `correlation` the number of neighbouring points that share one error. `ambiguity` px is how far
-    the visible edge may lie from the bore's edge (burr, die roll, edge break), `blur` px the width
-    of the edge. `ellipse` is the robust fit (x, y, semi-major, semi-minor, angle rad) in pixels.
+    the visible edge may lie from the bore's edge (burr, die roll, edge break), `drawn` (n,) px how
+    far the bore's wall may have drawn each point, by a share common to all, `blur` px the width of
+    the edge. `ellipse` is the robust fit (x, y, semi-major, semi-minor, angle rad) in pixels.
     """
 
     points: Array
@@ -44,6 +45,7 @@ class Rim:
     correlation: float
     ellipse: tuple[float, float, float, float, float]
     ambiguity: float = 0.0
+    drawn: Array | float = 0.0
     blur: float = 1.0
     quality: dict[str, float] = field(default_factory=dict)
 

@@ -11,7 +11,7 @@ its cause, spread as the cause is (GUM, section 5.1). The sources in the camera 
 | `normal_prior` | what the plan's normal leaves open |
 | `form` | ovality, and for the two-step method every wave of the rim |
 | `radius_prior` | the plan's radius, where the rim is too short to do without |
-| `edge_ambiguity` | burr, die roll, uneven light: what is seen is not the bore's edge |
+| `edge_ambiguity` | burr, die roll, uneven light, the wall: what is seen is not the bore's edge |
 | `light_plane`, `intrinsics` | the sensor's calibration |
 | `method` | the two-step method's own error at the tilt that must be reckoned with |
 """
@@ -109,13 +109,16 @@ def one_sided(rim: Rim) -> float:
 
 
 def _edge_ambiguity(solution: Solution, rim: Rim) -> Array:
-    """Let the seen edge lie beside the bore's all round, and more so on one side."""
+    """Let the seen edge lie beside the bore's all round, more so on one side; or be drawn there by
+    the wall.
+    """
     points = solution.seen[0]
     toward = points.rows.toward
     aside = one_sided(rim)
     sigma = np.hypot([2.0 * aside, aside, aside], [RADIUS_DOUBT, CENTRE_DOUBT, CENTRE_DOUBT])
-    causes = np.column_stack([np.ones(len(toward)), toward]) * sigma
-    return _spread(solution.response(points, causes), np.eye(3))
+    beside = np.column_stack([np.ones(len(toward)), toward]) * sigma
+    causes = np.column_stack([beside, np.broadcast_to(rim.drawn, len(toward))])
+    return _spread(solution.response(points, causes), np.eye(4))
 
 
 def _sensor_budget(solution: Solution, sensor: SensorModel) -> Budget:
