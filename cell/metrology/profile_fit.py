@@ -89,6 +89,7 @@ def fit_profile(band: Band, rays: Mask, walls: list[Wall], *, doubled: bool = Tr
             if misfit < wall.worth * least:
                 best, least, chosen = state, misfit, wall
     thinned = band[used[::THINNED]]
+    # One step: run on, a wall that nobody could predict goes on widening where it explains noise.
     best, _ = _descend(RimModel(thinned, chosen), thinned, best, steps=1)
     return RimModel(band, chosen).read(best)
 

@@ -22,7 +22,7 @@ def look(station: Station, exposures: Mapping[Light, float], attempt: int) -> tu
     Args:
         station: the open devices; the arm has just arrived.
         exposures: exposure time by light, s.
-        attempt: the how-manieth look at this hole.
+        attempt: which look at this hole it is, from 0.
 
     Returns:
         The view under the ring light and the view under the laser.
