@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import contextlib
 import os
 import re
 import select
@@ -13,7 +14,7 @@ from collections import deque
 from collections.abc import Iterator
 from threading import Lock
 from types import TracebackType
-from typing import TextIO
+from typing import Any, TextIO
 
 ESCAPES = re.compile(r"\x1b(\[[0-9;?]*[ -/]*[@-~]|O.|)")  # arrows and their like mean nothing here
 RUBOUT, ERASE_LINE, ENTER = ("\x7f", "\b"), "\x15", ("\n", "\r")
@@ -24,7 +25,8 @@ class Keys:
     """The keys of a terminal; where standard input is none, nobody ever presses one.
 
     The terminal hands out single keys, unseen, from the first look on until `rest` or `close`.
-    Ctrl-C stays what it is. `draft` is the part of a line that `lines` has read so far.
+    Ctrl-C stays what it is; of a terminal that is lost (a connection broke) no key comes any more.
+    `draft` is the part of a line that `lines` has read so far.
     """
 
     def __init__(self, stream: TextIO | None = None) -> None:
@@ -49,7 +51,7 @@ class Keys:
         if not self._typed and self._listens():
             ready, _, _ = select.select([self._fd], [], [], timeout)
             if ready:
-                self._take(os.read(self._fd, 1024))
+                self._take(self._read())
         return self._typed.popleft() if self._typed else None
 
     def lines(self) -> Iterator[str]:
@@ -71,23 +73,36 @@ class Keys:
         to it: an answer may set an arm in motion.
         """
         with self._lock:
-            if self._before is not None:
-                termios.tcsetattr(self._fd, termios.TCSAFLUSH, self._before)
+            self._give_back()
             self._typed.clear()
 
     def close(self) -> None:
         """Give the terminal back for good; keys that were meant for this program go with it."""
         with self._lock:
-            if self._before is not None and termios.tcgetattr(self._fd) != self._before:
-                termios.tcsetattr(self._fd, termios.TCSAFLUSH, self._before)
+            self._give_back(unless=self._before)
             self.here = False
+
+    def _give_back(self, unless: list[Any] | None = None) -> None:
+        """Set the terminal as it was, `unless` it is so already, and throw away what was typed."""
+        with contextlib.suppress(termios.error):  # it is lost
+            if self._before is not None and termios.tcgetattr(self._fd) != unless:
+                termios.tcsetattr(self._fd, termios.TCSAFLUSH, self._before)
 
     def _listens(self) -> bool:
         """Have the terminal hand out single keys, also after a stop and `fg`."""
         with self._lock:
-            if self.here and termios.tcgetattr(self._fd)[3] & termios.ICANON:
-                tty.setcbreak(self._fd, termios.TCSADRAIN)
+            try:
+                if self.here and termios.tcgetattr(self._fd)[3] & termios.ICANON:
+                    tty.setcbreak(self._fd, termios.TCSADRAIN)
+            except termios.error:
+                self.here = False
             return self.here
+
+    def _read(self) -> bytes:
+        try:
+            return os.read(self._fd, 1024)
+        except OSError:
+            return b""
 
     def _take(self, raw: bytes) -> None:
         if not raw:

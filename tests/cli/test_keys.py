@@ -47,6 +47,18 @@ def test_the_terminal_is_given_back_whatever_happens(terminal):
     assert termios.tcgetattr(stream.fileno()) == before
 
 
+@pytest.mark.parametrize("looked", [False, True])
+def test_a_terminal_that_is_lost_presses_no_key_and_stops_nobody(looked):
+    person, program = pty.openpty()
+    with os.fdopen(program, "r") as stream, Keys(stream) as keys:
+        if looked:
+            keys.pressed()
+        os.close(person)
+        assert keys.pressed() is None
+        assert list(keys.lines()) == []
+        keys.rest()
+
+
 def test_what_was_typed_before_a_question_is_no_answer_to_it(terminal):
     person, stream = terminal
     with Keys(stream) as keys:
