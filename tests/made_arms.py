@@ -6,9 +6,9 @@ from scipy.spatial.transform import Rotation
 
 from cell.core.geometry import Transform
 from cell.core.kinematics import arm_for
-from cell.metrology.board_pose import locate_boards
-from cell.metrology.hand_eye import HandEyeProblem, HandEyeView, solve_hand_eye
-from cell.metrology.kinematic_calibration import JointView, with_rows
+from cell.metrology.calibrate.board_pose import locate_boards
+from cell.metrology.calibrate.hand_eye.solve import HandEyeProblem, HandEyeView, solve_hand_eye
+from cell.metrology.calibrate.kinematics import JointView, with_rows
 from cell.metrology.motions import lay_onto
 
 RESTING = np.radians([137.0, -90.0, 100.0, 0.0, 60.0, 150.0])

@@ -5,7 +5,7 @@ from made_scenes import demo_scene, demo_world
 from scipy.spatial.transform import Rotation
 
 from cell.core.geometry import Transform
-from cell.metrology.detect_board import BoardDesign
+from cell.metrology.calibrate.detect_board import BoardDesign
 from cell.sim.render import Setting, render
 from cell.sim.render_lens import Lens
 from cell.sim.render_light import Lamps

@@ -18,7 +18,7 @@ from cell.core.documents.record import Attempt, HoleRecord, Start, Stop
 from cell.core.documents.result import BodyResult, Feature, Located, Measured, NotMeasured
 from cell.core.geometry import Transform
 from cell.core.observation import Observation, View
-from cell.metrology.decide import judge_axis, judge_run
+from cell.metrology.judge.decide import judge_axis, judge_run
 from cell.programs.approve import approval_hashes
 from cell.programs.shift.work import Begun, PreparedJob
 from cell.recording import Recorder

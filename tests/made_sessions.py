@@ -11,13 +11,18 @@ from scipy.spatial.transform import Rotation
 
 from cell.core.geometry import Transform
 from cell.core.optics import CameraModel
-from cell.metrology.board_pose import BoardPose, BoardView, locate_boards, pose_information
-from cell.metrology.hand_eye import HandEyeProblem, HandEyeView, RobotNoise
-from cell.metrology.hand_eye_session import HandEyeSession
-from cell.metrology.hand_eye_start import solve_park
+from cell.metrology.calibrate.board_pose import (
+    BoardPose,
+    BoardView,
+    locate_boards,
+    pose_information,
+)
+from cell.metrology.calibrate.hand_eye.session import HandEyeSession
+from cell.metrology.calibrate.hand_eye.solve import HandEyeProblem, HandEyeView, RobotNoise
+from cell.metrology.calibrate.hand_eye.start import solve_park
+from cell.metrology.calibrate.pose_planning import plan_views
+from cell.metrology.calibrate.working_volume import VOLUME
 from cell.metrology.motions import nudge, stack
-from cell.metrology.pose_planning import plan_views
-from cell.metrology.working_volume import VOLUME
 
 WIDE = CameraModel((2448, 2048), np.array([[3478.0, 0.0, 1231.0], [0.0, 3479.0, 1017.0],
                                            [0.0, 0.0, 1.0]]),

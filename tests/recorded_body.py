@@ -14,8 +14,8 @@ import yaml
 
 from cell.core.documents.papers import Papers
 from cell.core.documents.record import HoleRecord, Start, Stop
-from cell.metrology.decide import judge_run
-from cell.metrology.measure import measure_hole
+from cell.metrology.judge.decide import judge_run
+from cell.metrology.measure.hole import measure_hole
 from cell.recording import Recorder, collect_versions, read
 
 GOLDEN = Path(__file__).parent / "golden" / "schema_1.rrd"

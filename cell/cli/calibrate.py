@@ -18,7 +18,7 @@ from cell.cli.words import answers, console, print_json, user_name
 
 if TYPE_CHECKING:
     from cell.core.documents.calibration_session import What
-    from cell.metrology.hand_eye_calibration import HandEyeAnswer
+    from cell.metrology.calibrate.hand_eye.calibration import HandEyeAnswer
 
 ACCEPTED, REFUSED = 0, 1
 STYLE = {"pass": "green", "solved": "green", "warn": "yellow", "refuse": "red"}
@@ -144,7 +144,7 @@ def hand_eye(
 
 
 def _solve_recorded(recorded: Path, gates: Gates, mount: Mount | None, as_json: bool) -> None:
-    from cell.metrology.hand_eye_calibration import calibrate_hand_eye
+    from cell.metrology.calibrate.hand_eye.calibration import calibrate_hand_eye
     from cell.programs.calibration.recorded import read_gates, read_recorded
 
     read = read_recorded(recorded, None if mount is None else mount.value)

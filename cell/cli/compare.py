@@ -11,7 +11,7 @@ from rich.table import Table
 from cell.cli.words import answers, print_json
 
 if TYPE_CHECKING:
-    from cell.metrology.compare import Comparison, Statistics
+    from cell.metrology.judge.compare import Comparison, Statistics
 
 CHANCE = 0.05  # a bias that chance would give more rarely is one
 
@@ -32,7 +32,7 @@ def compare(
     """
     from cell.archive.files import read_text
     from cell.core.documents.points import read_measured_points, read_nominal_points
-    from cell.metrology.compare import compare_points
+    from cell.metrology.judge.compare import compare_points
 
     comparison = compare_points(read_measured_points(read_text(measured), str(measured)),
                                 read_nominal_points(read_text(nominals), str(nominals)),

@@ -12,7 +12,7 @@ from cell.cli.words import answers, print_json
 from cell.core.errors import DocumentError
 
 if TYPE_CHECKING:
-    from cell.metrology.error_model import Ranges
+    from cell.metrology.locate.error_model import Ranges
 
 RADII = [3.0, 5.0, 10.0, 15.0]
 
@@ -40,7 +40,7 @@ def error_model(
     from cell.archive.files import read_text
     from cell.core.documents.calibration import SensorDocument
     from cell.core.documents.text import parse
-    from cell.metrology import error_model as model
+    from cell.metrology.locate import error_model as model
 
     ranges = _ranges({"x": x, "y": y, "z": z}, tilt_deg, radius)
     plane = parse(SensorDocument, read_text(sensor), str(sensor)).model.light_plane
@@ -59,7 +59,7 @@ def error_model(
 
 
 def _ranges(reach: dict[str, float], tilt_deg: float, radii: list[float]) -> Ranges:
-    from cell.metrology.error_model import Ranges
+    from cell.metrology.locate.error_model import Ranges
 
     wrong = [f"--{name}-mm {value}" for name, value in reach.items() if not 0 < value < 100]
     wrong += [f"--tilt-deg {tilt_deg}"] if not 0 < tilt_deg <= 30 else []

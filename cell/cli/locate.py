@@ -59,7 +59,7 @@ def locate(
     from cell.archive.images import read_image
     from cell.core.documents.calibration import SensorDocument
     from cell.core.documents.text import parse
-    from cell.metrology.locate import locate_pair
+    from cell.metrology.locate.pair import locate_pair
 
     expected = _expect(radius, normal, normal_sigma_deg, thickness)
     document = parse(SensorDocument, read_text(sensor), str(sensor))

@@ -15,7 +15,7 @@ from cell.cli.words import answers, print_json
 from cell.core.errors import IN_TOLERANCE, OUT_OF_TOLERANCE
 
 if TYPE_CHECKING:
-    from cell.metrology.study import Interval, Type1, Type3
+    from cell.metrology.study.studies import Interval, Type1, Type3
     from cell.programs.study import Finding, Repeatability
 
 study_app = typer.Typer(
@@ -57,7 +57,7 @@ def study_type1(files: list[Path] = FILES,
                 limit: float = typer.Option(1.33, min=0.1, help="The least Cg and Cgk."),
                 confidence: float = CONFIDENCE, as_json: bool = JSON) -> None:
     """Capability of the gauge on one master: Cg, Cgk and the t-test of the bias."""
-    from cell.metrology.study import Type1Rule
+    from cell.metrology.study.studies import Type1Rule
     from cell.programs import study
 
     rule = Type1Rule(share, sigmas, limit)

@@ -12,7 +12,7 @@ from cell.cli.words import answers, console, print_json
 from cell.core.errors import IN_TOLERANCE, OUT_OF_TOLERANCE
 
 if TYPE_CHECKING:
-    from cell.metrology.offsets_study import Learnt, OffsetsStudy
+    from cell.metrology.study.offsets import Learnt, OffsetsStudy
     from cell.programs.offsets import LearntOffsets
 
 

@@ -15,10 +15,10 @@ from cell.core.documents.papers import Papers
 from cell.core.documents.station import StationDocument
 from cell.core.errors import DocumentError
 from cell.core.kinematics import arm_for
-from cell.metrology.align import check_alignment
-from cell.metrology.datum import UndeterminedError
-from cell.metrology.decide import Circumstances, sort_offsets
-from cell.metrology.plan import Plan, PlannedStop, draw_plan
+from cell.metrology.judge.align import check_alignment
+from cell.metrology.judge.datum import UndeterminedError
+from cell.metrology.judge.decide import Circumstances, sort_offsets
+from cell.metrology.plan.stops import Plan, PlannedStop, draw_plan
 
 
 @dataclass(frozen=True)

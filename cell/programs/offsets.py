@@ -14,7 +14,7 @@ from cell.core.documents.papers import Papers
 from cell.core.documents.record import HoleRecord, Start, Stop
 from cell.core.documents.text import dump
 from cell.core.errors import DocumentError
-from cell.metrology.offsets_study import (
+from cell.metrology.study.offsets import (
     FEWEST_RUNS,
     MasterRun,
     OffsetsStudy,

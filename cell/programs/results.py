@@ -15,7 +15,7 @@ from sqlalchemy import Connection, select
 from cell.core.documents.papers import Papers
 from cell.core.documents.record import HoleRecord, Start, Stop
 from cell.core.errors import DocumentError
-from cell.metrology.decide import judge_run
+from cell.metrology.judge.decide import judge_run
 from cell.recording.pages import PRUNED, read_pages
 from cell.results.booking import BodyRows, Booking, Row, body_rows, book
 from cell.results.database import Database, connect, open_database, recreate_results

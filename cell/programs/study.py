@@ -13,8 +13,8 @@ import numpy as np
 from cell.core.documents.nominals import AXES
 from cell.core.errors import DocumentError
 from cell.core.geometry import Array
-from cell.metrology.nested import Component, solve_components
-from cell.metrology.study import (
+from cell.metrology.study.nested import Component, solve_components
+from cell.metrology.study.studies import (
     Spread,
     StudyRefusedError,
     Type1,

@@ -11,7 +11,7 @@ import rerun as rr
 from cell.core.geometry import Array
 from cell.core.observation import Image
 from cell.core.optics import CameraModel
-from cell.metrology.camera_calibration import GRID
+from cell.metrology.calibrate.camera import GRID
 from cell.recording import colours
 from cell.recording.calibration_blueprint import (
     COVERAGE,

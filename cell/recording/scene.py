@@ -9,7 +9,7 @@ import rerun as rr
 from cell.core.documents.papers import Papers
 from cell.core.documents.record import HoleRecord, Start, Stop
 from cell.core.documents.result import BodyResult
-from cell.metrology.decide import judge_run
+from cell.metrology.judge.decide import judge_run
 from cell.recording import layout
 from cell.recording.blueprint import build_blueprint
 from cell.recording.body_scene import (

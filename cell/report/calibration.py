@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from jinja2 import Environment, PackageLoader, select_autoescape
 
 from cell.core.geometry import Array
-from cell.metrology.calibration_gates import Checked, Ruling
-from cell.metrology.camera_calibration import CameraResult
-from cell.metrology.hand_eye_calibration import HandEyeAnswer
-from cell.metrology.light_plane import LightPlaneResult
-from cell.metrology.sphere import SphereResult
+from cell.metrology.calibrate.camera import CameraResult
+from cell.metrology.calibrate.gates import Checked, Ruling
+from cell.metrology.calibrate.hand_eye.calibration import HandEyeAnswer
+from cell.metrology.calibrate.light_plane import LightPlaneResult
+from cell.metrology.calibrate.sphere import SphereResult
 from cell.report.calibration_pictures import (
     draw_before_and_after,
     draw_board_points,

@@ -12,11 +12,11 @@ from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
 from cell.core.geometry import Array, Transform
-from cell.metrology.hand_eye import HandEyeProblem, HandEyeResult
-from cell.metrology.hand_eye_calibration import HandEyeAnswer
-from cell.metrology.light_plane import LightPlaneResult
+from cell.metrology.calibrate.hand_eye.calibration import HandEyeAnswer
+from cell.metrology.calibrate.hand_eye.solve import HandEyeProblem, HandEyeResult
+from cell.metrology.calibrate.light_plane import LightPlaneResult
+from cell.metrology.calibrate.sphere import SphereResult
 from cell.metrology.motions import lay_onto, point_shift
-from cell.metrology.sphere import SphereResult
 
 INK, MUTED, ACCENT = "#1b2a41", "#8d99ae", "#d1495b"
 LARGER = (1, 2, 5, 10, 20, 50, 100, 200, 500)  # by which board points may be drawn apart

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from cell.core.errors import DocumentError
 from cell.core.geometry import Array
-from cell.metrology.error_model import Ranges, SensorGeometry, error_x, error_y, error_z
+from cell.metrology.locate.error_model import Ranges, SensorGeometry, error_x, error_y, error_z
 
 STEPS = 61
 LEVELS = 15

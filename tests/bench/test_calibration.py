@@ -13,9 +13,9 @@ import pytest
 from made_arms import StudyWorld
 from made_sessions import SMALL, WIDE, World, plain_reprojection, plan
 
-from cell.metrology.hand_eye import solve_hand_eye
-from cell.metrology.hand_eye_start import solve_park
-from cell.metrology.kinematic_calibration import solve_kinematics
+from cell.metrology.calibrate.hand_eye.solve import solve_hand_eye
+from cell.metrology.calibrate.hand_eye.start import solve_park
+from cell.metrology.calibrate.kinematics import solve_kinematics
 
 pytestmark = [pytest.mark.bench, pytest.mark.timeout(900)]
 SEEDS = 40

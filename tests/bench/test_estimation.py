@@ -14,8 +14,8 @@ from rich.table import Table
 
 from cell.core.geometry import Transform
 from cell.metrology.features import Expected
-from cell.metrology.joint import locate_joint
-from cell.metrology.two_step import locate_two_step
+from cell.metrology.locate.joint import locate_joint
+from cell.metrology.locate.two_step import locate_two_step
 
 pytestmark = pytest.mark.bench
 

@@ -17,7 +17,7 @@ from cell.archive.images import read_image
 from cell.core.documents.calibration import SensorDocument
 from cell.core.documents.text import parse
 from cell.metrology.features import Expected
-from cell.metrology.locate import locate_pair
+from cell.metrology.locate.pair import locate_pair
 
 pytestmark = [pytest.mark.bench, pytest.mark.timeout(600)]
 TRUTH_U = np.array([0.07, 0.02, 0.15, 0.02])

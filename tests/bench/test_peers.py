@@ -20,9 +20,9 @@ from drawn_pictures import Scene, made_sensor
 from rich.console import Console
 from rich.table import Table
 
-from cell.metrology.detect_hole import detect_hole
-from cell.metrology.ellipse import Ellipse
-from cell.metrology.locate import locate_pair
+from cell.metrology.detect.ellipse import Ellipse
+from cell.metrology.detect.hole import detect_hole
+from cell.metrology.locate.pair import locate_pair
 
 pytestmark = pytest.mark.bench
 

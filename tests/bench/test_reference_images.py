@@ -19,7 +19,7 @@ from cell.core.documents.calibration import SensorDocument
 from cell.core.documents.text import parse
 from cell.core.errors import DocumentError, UnmeasurableError
 from cell.metrology.features import Expected
-from cell.metrology.locate import locate_pair
+from cell.metrology.locate.pair import locate_pair
 
 pytestmark = [pytest.mark.bench, pytest.mark.timeout(600)]
 LIMITS = {"easy": 0.03, "medium": 0.05, "hard": 0.08}

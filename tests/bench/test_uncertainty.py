@@ -16,9 +16,9 @@ from rich.table import Table
 from cell.core.errors import UnmeasurableError
 from cell.core.geometry import Transform
 from cell.core.optics import CameraModel, SensorModel
-from cell.metrology.joint import locate_joint
-from cell.metrology.locate import locate_pair
-from cell.metrology.uncertainty import CENTRE_DOUBT, RADIUS_DOUBT
+from cell.metrology.locate.joint import locate_joint
+from cell.metrology.locate.pair import locate_pair
+from cell.metrology.locate.uncertainty import CENTRE_DOUBT, RADIUS_DOUBT
 
 pytestmark = [pytest.mark.bench, pytest.mark.timeout(1200)]
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cell.core.optics import CameraModel
-from cell.metrology.detect_hole import detect_hole
+from cell.metrology.detect.hole import detect_hole
 from cell.metrology.features import Expected
 
 pytestmark = pytest.mark.bench

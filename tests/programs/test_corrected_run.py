@@ -10,7 +10,7 @@ from cell.core.documents.calibration import KinematicsDocument
 from cell.core.documents.papers import Papers
 from cell.core.documents.text import dump
 from cell.core.errors import DocumentError
-from cell.metrology.measure import measure_hole
+from cell.metrology.measure.hole import measure_hole
 from cell.programs.audit.log import audit_log
 from cell.programs.audit.question import Question
 

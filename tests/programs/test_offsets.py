@@ -15,7 +15,7 @@ from cell.core.documents.result import Located, Measured
 from cell.core.errors import DocumentError
 from cell.core.geometry import Transform
 from cell.core.observation import Observation, View
-from cell.metrology.decide import judge_run
+from cell.metrology.judge.decide import judge_run
 from cell.programs.offsets import study_offsets, write_offsets
 from cell.recording import Recorder
 from cell.recording.seal import seal_path

@@ -12,7 +12,7 @@ from cell.core.documents.calibration import BodyDocument
 from cell.core.documents.text import parse
 from cell.core.errors import DocumentError
 from cell.core.geometry import Transform
-from cell.metrology.datum import Datum, solve_body_registration
+from cell.metrology.judge.datum import Datum, solve_body_registration
 from cell.programs.calibration.body import BodyRequest, body_figures, register_body
 from cell.sim.scene import read_scene
 from cell.sim.world import draw_world

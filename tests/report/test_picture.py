@@ -6,7 +6,7 @@ import pytest
 from drawn_pictures import Scene
 
 from cell.core.errors import UnmeasurableError
-from cell.metrology.locate import locate_pair
+from cell.metrology.locate.pair import locate_pair
 from cell.report.picture import AMBER, CYAN, GREEN, PINK, RED, draw_pair
 
 

@@ -13,7 +13,7 @@ from cell.core.documents.job import JobDocument
 from cell.core.documents.record import Start
 from cell.core.documents.text import parse
 from cell.core.errors import DocumentError
-from cell.metrology.locate import Method
+from cell.metrology.locate.pair import Method
 from cell.programs.audit.folder import FolderAudit, audit_folder
 from cell.programs.audit.question import WhatIf
 from cell.recording.pages import read_pages

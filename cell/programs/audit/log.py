@@ -15,8 +15,8 @@ from cell.core.documents.papers import Papers
 from cell.core.documents.record import Attempt, HoleRecord, Start, Stop
 from cell.core.documents.result import BodyResult, Outcome
 from cell.core.errors import CellError
-from cell.metrology.decide import judge_run
-from cell.metrology.measure import measure_hole
+from cell.metrology.judge.decide import judge_run
+from cell.metrology.measure.hole import measure_hole
 from cell.programs.audit.compare import Comparison, Difference, compare
 from cell.programs.audit.consistency import contradictions
 from cell.programs.audit.question import Question

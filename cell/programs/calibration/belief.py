@@ -22,8 +22,8 @@ from cell.core.geometry import Transform
 from cell.core.kinematics import Arm, arm_for
 from cell.core.optics import SensorModel
 from cell.core.ports import Joints
-from cell.metrology.detect_board import BoardDesign
-from cell.metrology.ridge import runs_upright
+from cell.metrology.calibrate.detect_board import BoardDesign
+from cell.metrology.detect.ridge import runs_upright
 from cell.programs.calibration.chain import Chain
 
 

@@ -17,9 +17,14 @@ from cell.core.documents.text import dump, parse
 from cell.core.errors import DocumentError
 from cell.core.geometry import Array
 from cell.core.ports import Operator
-from cell.metrology.calibration_gates import Checked, Level, Ruling, check_gates, worst
-from cell.metrology.datum import Datum, Registration, UndeterminedError, solve_body_registration
-from cell.metrology.plan import PlannedStop
+from cell.metrology.calibrate.gates import Checked, Level, Ruling, check_gates, worst
+from cell.metrology.judge.datum import (
+    Datum,
+    Registration,
+    UndeterminedError,
+    solve_body_registration,
+)
+from cell.metrology.plan.stops import PlannedStop
 from cell.programs.calibration.capture import as_rows
 from cell.programs.calibration.drift_log import REGISTERED, append_line
 from cell.programs.calibration.recorded import read_gates

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from cell.core.documents.calibration import KinematicsDocument
 from cell.core.geometry import Transform
 from cell.core.ports import Joints
-from cell.metrology.arm_correction import correct_flange
+from cell.metrology.measure.arm_correction import correct_flange
 
 
 @dataclass(frozen=True, eq=False)

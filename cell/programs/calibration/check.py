@@ -14,10 +14,10 @@ from cell.core.documents.targets import BoardDocument, SphereDocument
 from cell.core.errors import DocumentError, UnmeasurableError
 from cell.core.geometry import Array, Transform
 from cell.core.ports import Operator
-from cell.metrology.board_pose import locate_boards
-from cell.metrology.calibration_gates import Checked, Level, worst
-from cell.metrology.detect_board import detect_board
-from cell.metrology.drift import Drift, judge_drift
+from cell.metrology.calibrate.board_pose import locate_boards
+from cell.metrology.calibrate.detect_board import detect_board
+from cell.metrology.calibrate.gates import Checked, Level, worst
+from cell.metrology.study.drift import Drift, judge_drift
 from cell.programs.calibration.belief import Belief, design_of, read_belief
 from cell.programs.calibration.capture import drive, shoot
 from cell.programs.calibration.drift_log import CORRECTED, append_line, read_past

@@ -12,7 +12,7 @@ from cell.core.documents.calibration import HandEyeDocument, SensorDocument
 from cell.core.documents.text import parse
 from cell.core.geometry import Transform
 from cell.core.optics import SensorModel
-from cell.metrology.set_change import Calibrated, changes
+from cell.metrology.calibrate.set_change import Calibrated, changes
 
 MEANT = {"hand_eye": "the hand-eye", "light_plane": "the light plane", "focal": "the focal length"}
 

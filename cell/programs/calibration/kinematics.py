@@ -10,9 +10,9 @@ import numpy as np
 from cell.core.documents.calibration import KinematicsDocument
 from cell.core.geometry import Array
 from cell.core.optics import CameraModel
-from cell.metrology.board_pose import locate_boards
-from cell.metrology.hand_eye_calibration import HandEyeAnswer
-from cell.metrology.kinematic_calibration import JointView, KinematicResult, solve_kinematics
+from cell.metrology.calibrate.board_pose import locate_boards
+from cell.metrology.calibrate.hand_eye.calibration import HandEyeAnswer
+from cell.metrology.calibrate.kinematics import JointView, KinematicResult, solve_kinematics
 from cell.programs.calibration.belief import Belief
 from cell.programs.calibration.capture import as_six
 from cell.programs.calibration.chain import Chain

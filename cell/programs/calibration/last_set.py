@@ -8,8 +8,8 @@ import numpy as np
 
 from cell.core.geometry import Array
 from cell.core.optics import SensorModel
-from cell.metrology.calibration_gates import Level, check_gates
-from cell.metrology.set_change import Calibrated, changes
+from cell.metrology.calibrate.gates import Level, check_gates
+from cell.metrology.calibrate.set_change import Calibrated, changes
 from cell.programs.calibration.belief import Belief
 from cell.programs.calibration.recorded import read_gates
 from cell.programs.calibration.solve import Solution, chain_of

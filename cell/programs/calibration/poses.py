@@ -12,12 +12,12 @@ from cell.core.documents.targets import SphereDocument
 from cell.core.errors import DocumentError
 from cell.core.geometry import Transform
 from cell.core.ports import Joints
-from cell.metrology.detect_board import BoardDesign
-from cell.metrology.hand_eye import HandEyeProblem, HandEyeView
-from cell.metrology.pose_planning import plan_views, predict_point_sigma
-from cell.metrology.sphere_views import draw_sphere_views
-from cell.metrology.view_candidates import Spread, draw_candidates, predict_board
-from cell.metrology.way import Leg, check_leg
+from cell.metrology.calibrate.detect_board import BoardDesign
+from cell.metrology.calibrate.hand_eye.solve import HandEyeProblem, HandEyeView
+from cell.metrology.calibrate.pose_planning import plan_views, predict_point_sigma
+from cell.metrology.calibrate.sphere_views import draw_sphere_views
+from cell.metrology.calibrate.view_candidates import Spread, draw_candidates, predict_board
+from cell.metrology.plan.way import Leg, check_leg
 from cell.programs.calibration.belief import Belief
 
 CANDIDATES = 140

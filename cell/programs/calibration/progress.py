@@ -8,11 +8,11 @@ import numpy as np
 
 from cell.core.documents.calibration_session import SessionHeader
 from cell.core.geometry import Transform
-from cell.metrology.board_pose import locate_boards
-from cell.metrology.calibration_gates import Checked
-from cell.metrology.calibration_progress import GatheredView, check_progress
-from cell.metrology.hand_eye import HandEyeProblem, HandEyeView
-from cell.metrology.pose_planning import predict_point_sigma
+from cell.metrology.calibrate.board_pose import locate_boards
+from cell.metrology.calibrate.gates import Checked
+from cell.metrology.calibrate.hand_eye.solve import HandEyeProblem, HandEyeView
+from cell.metrology.calibrate.pose_planning import predict_point_sigma
+from cell.metrology.calibrate.progress import GatheredView, check_progress
 from cell.programs.calibration.belief import Belief
 from cell.programs.calibration.recorded import read_gates
 from cell.programs.calibration.seen import SeenView

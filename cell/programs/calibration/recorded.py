@@ -26,14 +26,14 @@ from cell.core.documents.table import Row, read_table
 from cell.core.documents.text import parse
 from cell.core.errors import DocumentError, UnmeasurableError
 from cell.core.geometry import Array
-from cell.metrology.board_pose import FEWEST_CORNERS, BoardView
-from cell.metrology.calibration_gates import GateBook
-from cell.metrology.diagnosis import as_given
-from cell.metrology.hand_eye import Mount
-from cell.metrology.hand_eye_session import HandEyeSession
-from cell.metrology.hand_eye_start import solve_park
+from cell.metrology.calibrate.board_pose import FEWEST_CORNERS, BoardView
+from cell.metrology.calibrate.gates import GateBook
+from cell.metrology.calibrate.hand_eye.diagnosis import as_given
+from cell.metrology.calibrate.hand_eye.readings import fit_reading
+from cell.metrology.calibrate.hand_eye.session import HandEyeSession
+from cell.metrology.calibrate.hand_eye.solve import Mount
+from cell.metrology.calibrate.hand_eye.start import solve_park
 from cell.metrology.motions import nearest_rotation
-from cell.metrology.readings import fit_reading
 
 ROUNDED = 1e-3  # of R Rᵀ = 1: digits lost in print; beyond it the matrix is no rotation
 FLAT = 1e-3     # mm
@@ -57,7 +57,7 @@ class Recorded:
 
 def read_gates() -> GateBook:
     """Read the gates that come with the package."""
-    file = resources.files("cell.metrology") / "calibration_gates.yaml"
+    file = resources.files("cell.metrology.calibrate") / "gates.yaml"
     return parse(GateBook, file.read_text("utf-8"), file.name)
 
 

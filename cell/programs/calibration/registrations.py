@@ -13,7 +13,7 @@ from cell.core.documents.calibration import BodyDocument
 from cell.core.documents.text import dump, parse
 from cell.core.errors import DocumentError
 from cell.core.geometry import Transform
-from cell.metrology.drift import is_small
+from cell.metrology.study.drift import is_small
 from cell.programs.calibration.capture import as_rows
 
 

@@ -9,9 +9,9 @@ from cell.core.documents.targets import BoardDocument
 from cell.core.errors import UnmeasurableError
 from cell.core.geometry import Array
 from cell.core.observation import Image
-from cell.metrology.board_pose import BoardView
-from cell.metrology.detect_board import detect_board
-from cell.metrology.detect_board_stripe import detect_board_stripe
+from cell.metrology.calibrate.board_pose import BoardView
+from cell.metrology.calibrate.detect_board import detect_board
+from cell.metrology.calibrate.detect_board_stripe import detect_board_stripe
 from cell.programs.calibration.belief import Belief, design_of
 from cell.programs.calibration.session import Session
 

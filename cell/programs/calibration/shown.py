@@ -12,8 +12,8 @@ import numpy as np
 from cell.core.documents.calibration_session import SessionHeader, ViewRecord
 from cell.core.geometry import Array, Transform
 from cell.core.observation import View
-from cell.metrology.calibration_gates import Checked
-from cell.metrology.calibration_progress import GatheredView
+from cell.metrology.calibrate.gates import Checked
+from cell.metrology.calibrate.progress import GatheredView
 from cell.programs.calibration.belief import Belief, design_of
 from cell.programs.calibration.capture import Shots
 from cell.programs.calibration.progress import Progress

@@ -11,15 +11,15 @@ from cell.core.documents.calibration_session import Precondition
 from cell.core.errors import DocumentError, UnmeasurableError
 from cell.core.geometry import Plane
 from cell.core.optics import CameraModel, SensorModel
-from cell.metrology.board_pose import locate_boards
-from cell.metrology.calibration_gates import Checked, GateSet, Ruling, check_gates, worst
-from cell.metrology.calibration_progress import camera_figures, plane_figures
-from cell.metrology.camera_calibration import CameraResult, solve_camera
-from cell.metrology.hand_eye_calibration import HandEyeAnswer, calibrate_hand_eye
-from cell.metrology.hand_eye_session import HandEyeSession
-from cell.metrology.light_plane import LightPlaneResult, StripeOnBoard, solve_light_plane
+from cell.metrology.calibrate.board_pose import locate_boards
+from cell.metrology.calibrate.camera import CameraResult, solve_camera
+from cell.metrology.calibrate.gates import Checked, GateSet, Ruling, check_gates, worst
+from cell.metrology.calibrate.hand_eye.calibration import HandEyeAnswer, calibrate_hand_eye
+from cell.metrology.calibrate.hand_eye.session import HandEyeSession
+from cell.metrology.calibrate.light_plane import LightPlaneResult, StripeOnBoard, solve_light_plane
+from cell.metrology.calibrate.progress import camera_figures, plane_figures
+from cell.metrology.calibrate.sphere import SphereResult
 from cell.metrology.motions import stack
-from cell.metrology.sphere import SphereResult
 from cell.programs.calibration.belief import Belief
 from cell.programs.calibration.chain import Chain
 from cell.programs.calibration.kinematics import KinematicsFound, find_kinematics

@@ -14,9 +14,9 @@ from cell.core.geometry import Array, Transform
 from cell.core.observation import Image
 from cell.core.optics import SensorModel
 from cell.core.ports import Joints, Operator
-from cell.metrology.calibration_gates import Checked, Gate, check_gates
-from cell.metrology.detect_sphere_stripe import detect_sphere_stripe
-from cell.metrology.sphere import SphereProblem, SphereResult, solve_sphere
+from cell.metrology.calibrate.detect_sphere_stripe import detect_sphere_stripe
+from cell.metrology.calibrate.gates import Checked, Gate, check_gates
+from cell.metrology.calibrate.sphere import SphereProblem, SphereResult, solve_sphere
 from cell.programs.calibration.belief import Belief
 from cell.programs.calibration.chain import Chain
 

@@ -9,8 +9,8 @@ import numpy as np
 from cell.core.errors import UnmeasurableError
 from cell.core.observation import View
 from cell.core.optics import CameraModel
-from cell.metrology.board_pose import BoardPose, locate_boards
-from cell.metrology.detect_board import BoardDesign, SeenBoard, detect_board
+from cell.metrology.calibrate.board_pose import BoardPose, locate_boards
+from cell.metrology.calibrate.detect_board import BoardDesign, SeenBoard, detect_board
 from cell.recording.calibration_moment import Line
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from cell.core.geometry import Array
 from cell.core.optics import CameraModel
-from cell.metrology.board_pose import locate_boards
+from cell.metrology.calibrate.board_pose import locate_boards
 from cell.metrology.motions import lay_onto
 from cell.programs.calibration.belief import Belief
 from cell.programs.calibration.chain import Chain

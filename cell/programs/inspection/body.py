@@ -9,7 +9,7 @@ from typing import TypeAlias
 from cell.core.documents.nominals import Hole
 from cell.core.documents.record import HoleRecord, Start, Status, Stop
 from cell.core.documents.result import BodyResult
-from cell.metrology.decide import judge_run
+from cell.metrology.judge.decide import judge_run
 from cell.programs.inspection.chase import Chase
 from cell.programs.inspection.drive import Driver
 from cell.programs.inspection.prepare import Prepared

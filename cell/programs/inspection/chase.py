@@ -11,10 +11,10 @@ from cell.core.documents.record import Attempt, HoleRecord
 from cell.core.documents.result import Measured, NotMeasured, Outcome
 from cell.core.geometry import Transform
 from cell.core.observation import Light, Observation, View
-from cell.metrology.body_prediction import predict_body
-from cell.metrology.measure import measure_hole
-from cell.metrology.next_look import NextLook, decide_next
-from cell.metrology.plan import PlannedStop
+from cell.metrology.measure.hole import measure_hole
+from cell.metrology.measure.next_look import NextLook, decide_next
+from cell.metrology.plan.body_prediction import predict_body
+from cell.metrology.plan.stops import PlannedStop
 from cell.programs.inspection.drive import Driver, Stand
 from cell.programs.inspection.look import look
 from cell.programs.inspection.prepare import Prepared

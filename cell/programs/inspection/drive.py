@@ -10,9 +10,9 @@ import numpy as np
 from cell.core.errors import DeviceError
 from cell.core.geometry import Transform
 from cell.core.ports import Joints, Move, RobotState
-from cell.metrology.plan import PlannedStop
-from cell.metrology.stop_pose import step_back
-from cell.metrology.way import Leg, check_leg
+from cell.metrology.plan.stop_pose import step_back
+from cell.metrology.plan.stops import PlannedStop
+from cell.metrology.plan.way import Leg, check_leg
 from cell.programs.inspection.prepare import Prepared
 from cell.programs.station import Station
 

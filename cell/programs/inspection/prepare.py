@@ -9,7 +9,7 @@ from cell.archive.papers import PapersFound, read_papers
 from cell.core.documents.papers import Papers, check_identity
 from cell.core.errors import DeviceError
 from cell.core.kinematics import Arm, arm_for
-from cell.metrology.plan import PlannedStop, plan_stops
+from cell.metrology.plan.stops import PlannedStop, plan_stops
 from cell.programs.station import Station
 
 

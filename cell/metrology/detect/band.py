@@ -1,0 +1,95 @@
+"""Grey profiles across a rim that is roughly known.
+
+Profiles run along the normals of an ellipse, from the hole outward, so that an edge is a distance
+from that ellipse and a better ellipse is a linear problem away.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+
+from cell.core.geometry import Array
+from cell.core.observation import Image
+from cell.metrology.arrays import Grey, Indices
+from cell.metrology.detect.ellipse import Ellipse
+
+SMOOTHING = 0.8  # px, of the picture before edges are looked for
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """A smoothed part of an image; its first pixel is the pixel `origin` (x, y) of the image."""
+
+    grey: Grey
+    origin: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """Profiles across an ellipse: `grey` (n, m) at `offsets` (m,) px along the outward normals."""
+
+    ellipse: Ellipse
+    t: Array
+    offsets: Array
+    grey: Array
+
+    @property
+    def step(self) -> float:
+        """The distance between samples, px."""
+        return float(self.offsets[1] - self.offsets[0])
+
+    @cached_property
+    def slope(self) -> Array:
+        """How the grey rises outward (n, m), per px."""
+        return np.asarray(np.gradient(self.grey, self.step, axis=1))
+
+    @cached_property
+    def normals(self) -> Array:
+        """The unit outward normals (n, 2) that the profiles follow."""
+        return self.ellipse.normals(self.t)
+
+    @cached_property
+    def design(self) -> Array:
+        """How the ellipse moves along the profiles with each of its five numbers (n, 5)."""
+        return self.ellipse.design(self.t)
+
+    def levels(self, beside: float) -> tuple[Array, Array]:
+        """Give the mean grey of each profile further than `beside` px inside and outside (n,)."""
+        inner, outer = self.offsets < -beside, self.offsets > beside
+        return self.grey[:, inner].mean(axis=1), self.grey[:, outer].mean(axis=1)
+
+    def __getitem__(self, rays: Indices) -> Band:
+        """Return some of the profiles."""
+        return Band(self.ellipse, self.t[rays], self.offsets, self.grey[rays])
+
+
+def spread(half_width: float, step: float) -> Array:
+    """Space offsets `step` apart, as far as `half_width` to either side."""
+    return np.arange(-half_width, half_width + step / 2.0, step)
+
+
+def smooth_around(image: Image, ellipse: Ellipse, margin: float) -> Patch:
+    """Smooth the part of an image that an ellipse and a margin (px) around it cover."""
+    reach = ellipse.radius + margin + 4.0
+    size = np.array(image.shape[::-1])
+    first = np.clip(ellipse.centre - reach, 0, size - 1).astype(int)
+    last = np.clip(ellipse.centre + reach, first + 1, size).astype(int)
+    part = image[first[1]:last[1], first[0]:last[0]].astype(np.float32)
+    return Patch(cv2.GaussianBlur(part, (0, 0), SMOOTHING), first.astype(np.float64))
+
+
+def sample_band(patch: Patch, ellipse: Ellipse, offsets: Array, rays: int) -> Band:
+    """Sample a patch at `offsets` (m,) px along the outward normals of an ellipse.
+
+    Bilinear; beyond the patch the grey of its border goes on.
+    """
+    t = np.linspace(0.0, 2.0 * np.pi, rays, endpoint=False)
+    feet, normals = ellipse.points(t) - patch.origin, ellipse.normals(t)
+    x, y = ((feet[:, axis, None] + normals[:, axis, None] * offsets).astype(np.float32)
+            for axis in (0, 1))
+    grey = cv2.remap(patch.grey, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return Band(ellipse, t, offsets, grey.astype(np.float64))

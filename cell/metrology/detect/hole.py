@@ -1,0 +1,163 @@
+"""Find the rim of a hole in the ring-light picture, to a fraction of a pixel.
+
+Rough edges by their slope, those that agree on an ellipse, then the grey profiles of these rays:
+hole, wall and sheet, with the wall that thickness and tilt predict.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from cell.core.geometry import Array
+from cell.core.observation import Image
+from cell.core.optics import CameraModel
+from cell.metrology.arrays import Indices, Mask
+from cell.metrology.detect.band import SMOOTHING, Band, Patch, sample_band, spread
+from cell.metrology.detect.edges import Edges, find_edges
+from cell.metrology.detect.ellipse import Ellipse
+from cell.metrology.detect.find_holes import Hole, find_holes
+from cell.metrology.detect.gates import (
+    COMPLETE,
+    check_clear,
+    check_inside,
+    check_lit,
+    check_round,
+    check_settled,
+    check_unclipped,
+    check_whole,
+    clipped,
+)
+from cell.metrology.detect.profile import Profile
+from cell.metrology.detect.profile_fit import fit_profile, locate_edges, uneven_blur
+from cell.metrology.detect.rim_fit import agree, settle
+from cell.metrology.detect.wall import doubt_of_wall, is_known, lit, predict_wall, suspect_walls
+from cell.metrology.features import Expected, Rim
+from cell.metrology.reasons import refusal
+from cell.metrology.spread import correlation_length, middle, robust_sigma
+
+WIDE = 8.0             # px to either side, where edges are looked for first
+OUTWARD = 3.0          # px of sheet in a grey profile: more would add its texture
+INWARD = 3.0           # px of hole beyond the wall
+MANY = 0.87            # profiles an edge, below which two rims may show
+NOTICED = 0.7          # px of wall, below which its brightness makes no difference
+ROUGH_SPACING, SPACING = 3.0, 1.5  # px along the rim
+SHARP = 1.0            # px of blur by the lens, above which the edge itself may be rounded
+SOFT_DOUBT, SOFTEST = 6.0, 1.5  # px of ambiguity by each px beyond, and at most
+LIT_DOUBT, DARK_DOUBT = 0.4, 0.25  # of what a wall draws an edge by: a dark one is like another
+SMALL_ROUGHNESS = 0.25  # px from end to end, which texture alone gives
+EVEN, LIP = 0.06, 1.7   # px² that the blur's variance differs by all the same; lips beyond that
+CLIPPED_DOUBT = 0.6     # px, where white hides how high the step is
+
+
+def detect_hole(image: Image, camera: CameraModel, expected: Expected) -> Rim:
+    """Find the most complete hole of a ring-light image and its rim.
+
+    Raises:
+        UnmeasurableError: there is none, or it is cut by the border, covered or not round.
+    """
+    check_lit(image)
+    holes: list[Hole] = []
+    for hole in find_holes(image, camera, expected):
+        holes.append(hole)
+        if expected.radius is not None and hole.coverage > COMPLETE:
+            break  # the size is right and nothing is missing
+    if not holes:
+        raise refusal("no_hole")
+    best = max(holes, key=lambda hole: hole.coverage * hole.contrast**0.5)
+    return detect_rim(image, best, camera, expected)
+
+
+def detect_rim(image: Image, hole: Hole, camera: CameraModel, expected: Expected) -> Rim:
+    """Locate the rim of a hole that was found.
+
+    Raises:
+        UnmeasurableError: it is cut by the border, covered or not round.
+    """
+    check_whole(image, hole)
+    check_inside(image, hole.ellipse)
+    rough, seen, doubled = _rough_rim(hole)
+    walls = [predict_wall(rough, hole, camera, expected)]
+    known = is_known(expected)
+    if doubled and not known:
+        walls += suspect_walls(walls[0])
+    elif doubled or walls[0].widest > NOTICED:
+        walls.append(lit(walls[0]))
+    band = _profiles(hole.patch, rough, max(wall.widest for wall in walls))
+    rays = np.repeat(seen, -(-len(band.t) // len(seen)))[:len(band.t)]
+    profile = fit_profile(band, rays, walls, doubled=doubled or hole.inside > 0)
+    edge, height, misfit = locate_edges(band, profile)
+    unrest = middle(misfit[rays])
+    check_clear(abs(middle(height[rays])), unrest, profile.blur)
+    good = rays & (misfit < 3.0 * unrest) & (np.abs(edge - profile.edge) < 2.0)
+    check_settled(good)
+    check_unclipped(band.grey[good])
+    rim = _rim(band, edge, good, profile, hole)
+    doubt = 0.0 if known else doubt_of_wall(walls[0], profile)
+    return replace(rim, ambiguity=rim.ambiguity + doubt)
+
+
+def _rough_rim(hole: Hole) -> tuple[Ellipse, Mask, bool]:
+    """Fit the edges that agree: the ellipse, on which of its profiles they lie (n,), and whether
+    many profiles show more than one edge, as they do across a wall.
+    """
+    rays = _rays(hole.ellipse, ROUGH_SPACING)
+    band = sample_band(hole.patch, hole.ellipse, spread(WIDE, 0.5), rays)
+    edges = find_edges(band, hole.inside, 0.3 * hole.contrast)
+    agreed = edges[agree(band, edges, tolerance=2.0)[1]]
+    ellipse, miss, scale = settle(band, agreed, floor=0.02)
+    seen = agreed[np.abs(miss) < max(3.0 * scale, 1.0)].rays(rays)
+    return ellipse, seen, edges.rays(rays).sum() < MANY * len(edges.ray)
+
+
+def _profiles(patch: Patch, rim: Ellipse, wall_width: float) -> Band:
+    shown = np.clip(wall_width, 0.0, 0.3 * rim.radius)
+    offsets = np.arange(-np.ceil(INWARD + shown), max(OUTWARD, np.ceil(shown + 2.0)) + 0.5)
+    return sample_band(patch, rim, offsets, _rays(rim, SPACING))
+
+
+def _rays(rim: Ellipse, spacing: float) -> int:
+    return int(np.clip(2.0 * np.pi * rim.radius / spacing, 90, 400))
+
+
+def _rim(band: Band, edge: Array, good: Mask, profile: Profile, hole: Hole) -> Rim:
+    ray = np.nonzero(good)[0]
+    ellipse, miss, scale = settle(band, Edges(ray, edge[ray], edge[ray]), floor=0.01)
+    check_round(ellipse, scale)
+    kept = np.abs(miss) < 3.5 * scale
+    normals = band.normals[ray]
+    # A blurred disc looks smaller: its half level lies s**2 / 2R inside.
+    bend = profile.blur**2 / (2.0 * ellipse.radius)
+    points = band.ellipse.points(band.t[ray]) + (edge[ray] + bend)[:, None] * normals
+    x, y = map(float, ellipse.centre)
+    major, minor, angle = ellipse.axes
+    return Rim(points[kept], -normals[kept], robust_sigma(miss[kept]),
+               correlation_length(miss[kept]), (x, y, major + bend, minor + bend, angle),
+               ambiguity=_ambiguity(band, edge, ray, profile), drawn=_drawn(profile[ray[kept]]),
+               blur=profile.blur, quality=_quality(hole, profile, good))
+
+
+def _ambiguity(band: Band, edge: Array, rays: Indices, profile: Profile) -> float:
+    """Say how far the visible edge may lie beside the bore's (px): burr and die roll show as a
+    ragged edge, a soft one, or one that is softer here than there; what is white may be of any
+    height.
+    """
+    low, high = np.quantile((edge - profile.edge)[rays], [0.025, 0.975])
+    soft = np.sqrt(max(profile.blur**2 - SMOOTHING**2, 0.0)) - SHARP
+    uneven = uneven_blur(band[rays], replace(profile, edge=edge)[rays])
+    ragged = max(high - low - SMALL_ROUGHNESS, LIP * np.sqrt(max(uneven - EVEN, 0.0)))
+    white = CLIPPED_DOUBT * float(clipped(band.grey[rays]).mean())
+    return float(max(ragged, min(SOFT_DOUBT * soft, SOFTEST), 0.0) + white)
+
+
+def _drawn(profile: Profile) -> Array:
+    """Say how far (n,) px the wall may draw each edge otherwise than was thought."""
+    pull = profile.wall_pull
+    return np.where(pull > 0.0, LIT_DOUBT, DARK_DOUBT) * pull
+
+
+def _quality(hole: Hole, profile: Profile, good: Mask) -> dict[str, float]:
+    return {"coverage": float(good.mean()), "contrast": hole.contrast, "inside": float(hole.inside),
+            "blur_px": profile.blur, "wall_px": float(profile.width.max()),
+            "wall_pull_px": float(profile.wall_pull.max())}

@@ -1,0 +1,1 @@
+"""Where the robot stands before every hole, and how it gets there."""
