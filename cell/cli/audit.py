@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from cell.cli.audit_words import as_json, print_audit, print_change, print_row
+from cell.cli.audit_words import as_json, print_audit, print_change, print_fault, print_row
 from cell.cli.words import console, print_json
 
 if TYPE_CHECKING:
@@ -60,7 +60,8 @@ def audit(
     key, nor that the newest bodies were removed (compare the newest head with one kept elsewhere).
 
     Exit code: 0 identical or reproduced, 1 something differs, 2 unreadable or not intact. Under a
-    what-if: 0 all verdicts stay, 1 one changes.
+    what-if: 0 all verdicts stay, 1 one changes. With 4 (a picture could not be saved) and 70 (a
+    fault of the program) the audit itself failed: it says nothing of that recording.
     """
     from cell.programs.audit.gather import gather_logs, parse_since, read_what_if, started_since
     from cell.programs.audit.question import Question
@@ -74,6 +75,7 @@ def audit(
     audits, say = [], print_change if len(found) > 1 and question.what_if.asks else print_audit
     for each in _audit_with_progress(found, question, workers, cluster):
         audits.append(each)
+        print_fault(each)
         if not json_wanted:
             say(each)
     code = _exit_code(audits, folders, strict)
@@ -106,6 +108,6 @@ def _audit_with_progress(logs: Sequence[Path], question: Question, workers: int,
 
 
 def _exit_code(audits: Sequence[LogAudit], folders: Sequence[FolderAudit], strict: bool) -> int:
-    """Take the worst: what is not intact before what differs."""
+    """Take the worst: what failed before what is not intact, that before what differs."""
     codes = [each.exit_code(strict) for each in audits]
     return max(codes + [NOT_INTACT for folder in folders if folder.findings], default=0)

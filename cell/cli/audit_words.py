@@ -12,7 +12,7 @@ from rich.box import SIMPLE
 from rich.markup import escape
 from rich.table import Table
 
-from cell.cli.words import Answers, answers
+from cell.cli.words import Answers, answers, console
 
 if TYPE_CHECKING:
     from cell.programs.audit.compare import Difference
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Json: TypeAlias = Any
 
 COLOURS = {"identical": "green", "reproduced": "green", "differs": "red", "refused": "red",
-           "stays": "green", "changes": "red"}
+           "failed": "red", "stays": "green", "changes": "red"}
 MARKS = {True: "[green]yes[/]", False: "[red]no [/]", None: "[yellow]–  [/]"}
 WIDE = 120  # characters
 MOST = 24  # rows of a table; all are in the JSON
@@ -43,6 +43,13 @@ def print_audit(audit: LogAudit) -> None:
         _print_table(_differences(audit))
     if audit.changes:
         _print_table(_changes(audit.changes))
+
+
+def print_fault(audit: LogAudit) -> None:
+    """Print where the program failed over one recording, for whoever mends it."""
+    if audit.traceback:
+        console.print(f"{audit.log}: a fault of the program, not of your input\n{audit.traceback}",
+                      markup=False, highlight=False, soft_wrap=True, style="red")
 
 
 def print_change(audit: LogAudit) -> None:
@@ -94,7 +101,7 @@ def _log_as_json(audit: LogAudit) -> dict[str, Any]:
     changes = [{**asdict(change), "turns": change.turns} for change in audit.changes]
     said = asdict(audit) | {"log": str(audit.log), "answer": audit.answer, "numbers": numbers,
                             "changes": changes}
-    return {name: _finite(value) for name, value in said.items()}
+    return {name: _finite(value) for name, value in said.items() if name != "error_code"}
 
 
 def _finite(value: Json) -> Json:

@@ -1,10 +1,13 @@
 """`cell audit`, `repair`, `prune`, `seal-key`: words in, words out, an exit code."""
 
 import json
+from itertools import count
+from pathlib import Path
 
 import pytest
-from recorded_body import record_body
+from recorded_body import measured_anew, record_body
 
+import cell.programs.audit.log as log_audit
 from cell.cli.door import main
 
 
@@ -78,6 +81,32 @@ def test_a_what_if_shows_what_turns_and_changes_nothing(cell, keys, tmp_path):
     assert {change["feature"] for change in answer["changes"]} == {"BP2", "SI3", "QP2"}
     assert code == int(any(change["turns"] for change in answer["changes"]))
     assert log.read_bytes() == before
+
+
+def test_a_fault_of_the_program_ends_with_70_and_the_others_are_audited(cell, keys, tmp_path,
+                                                                        monkeypatch, capsys):
+    (tmp_path / "logs").mkdir()
+    for name in ("a", "b", "c"):
+        record_body(tmp_path / "logs" / f"{name}.rrd", holes=measured_anew()[1][:1])
+    measure, calls = log_audit.measure_hole, count()
+
+    def stumble(*given):
+        """Fail at the second recording."""
+        if next(calls) == 1:
+            raise KeyError("nowhere")
+        return measure(*given)
+
+    monkeypatch.setattr(log_audit, "measure_hole", stumble)
+    monkeypatch.setattr("sys.argv", ["cell", "audit", str(tmp_path / "logs"), "--json"])
+    with pytest.raises(SystemExit, match="70"):
+        main()
+    said = capsys.readouterr()
+    logs = {Path(each["log"]).name: each for each in json.loads(said.out)["logs"]}
+    assert {name: each["answer"] for name, each in logs.items()} == {
+        "a.rrd": "identical", "b.rrd": "failed", "c.rrd": "identical"}
+    assert "KeyError" in logs["b.rrd"]["problem"]
+    assert "b.rrd: a fault of the program" in said.err
+    assert 'raise KeyError("nowhere")' in said.err
 
 
 @pytest.mark.parametrize("words", [["audit", "nowhere.rrd"], ["repair", "nowhere.rrd"],

@@ -41,6 +41,16 @@ def with_outcome(index, **changes):
     return tuple(changed if hole is holes[index] else hole for hole in holes)
 
 
+def alter(log):
+    """Change one bit of the first hole's centre."""
+    content = bytearray(log.read_bytes())
+    place = content.find(measured_anew()[1][0].outcome.centre.tobytes())
+    assert place > 0
+    content[place + 3] ^= 1
+    log.chmod(0o644)
+    log.write_bytes(content)
+
+
 def fields(audit, level="differs"):
     return [each.where for each in audit.differences if each.level == level]
 
@@ -121,12 +131,7 @@ def test_an_unsealed_recording_is_refused_unless_told_otherwise(folder):
 
 def test_an_altered_recording_is_refused_and_the_chain_finds_it_even_unsealed(folder):
     log = record_body(folder / "altered.rrd")
-    content = bytearray(log.read_bytes())
-    place = content.find(measured_anew()[1][0].outcome.centre.tobytes())
-    assert place > 0
-    content[place + 3] ^= 1
-    log.chmod(0o644)
-    log.write_bytes(content)
+    alter(log)
     assert "file: altered" in audit_log(log).problem
     told = audit_log(log, UNSEALED)
     assert told.exit_code() == 2
@@ -161,14 +166,31 @@ def test_an_end_that_does_not_fit_the_holes_is_named(folder):
     assert "hole BP2: is recorded 2 times" in audit_log(twice).problem
 
 
-def test_content_that_no_function_can_measure_is_one_sentence(log, monkeypatch):
+@pytest.fixture
+def bug(monkeypatch):
+    """A measuring function that is at fault."""
     def stumble(*_):
         raise KeyError("nowhere")
 
     monkeypatch.setattr("cell.programs.audit.log.measure_hole", stumble)
+
+
+def test_a_bug_says_nothing_of_the_recording(log, bug):
     audit = audit_log(log)
-    assert (audit.exit_code(), audit.problem) == (2, "cannot be measured again: "
-                                                     "KeyError('nowhere')")
+    assert (audit.answer, audit.exit_code()) == ("failed", 70)
+    assert audit.problem == "a fault of the program: KeyError('nowhere')"
+    assert 'raise KeyError("nowhere")' in audit.traceback
+
+
+def test_altered_content_that_cannot_be_measured_is_not_intact(folder, bug):
+    """Whoever writes what no program would is no bug of this one."""
+    log = record_body(folder / "twisted.rrd")
+    alter(log)
+    audit = audit_log(log, UNSEALED)
+    assert (audit.answer, audit.exit_code(), audit.traceback) == ("refused", 2, "")
+    assert audit.problem.startswith("not intact: altered")
+    seal_path(log).unlink()
+    assert "does not follow" in audit_log(log, UNSEALED).problem
 
 
 def test_a_pruned_recording_keeps_its_chain_and_says_what_it_lost(folder):
@@ -244,7 +266,9 @@ def test_both_results_are_saved_over_the_same_image_where_they_differ(folder):
                                     "/comparison")} == {1}
     assert log.read_bytes() == before
     assert not [finding for finding in audit_folder(folder).findings if "audit" in finding.file]
-    assert "cannot be written: File exists" in audit_log(log, Question(save=True)).problem
+    again = audit_log(log, Question(save=True))
+    assert "cannot be written: File exists" in again.problem
+    assert (again.answer, again.exit_code()) == ("failed", 4)  # the recording is none the worse
 
 
 def test_where_nothing_differs_no_picture_is_saved(log):

@@ -14,13 +14,13 @@ import numpy as np
 from cell.core.documents.papers import Papers
 from cell.core.documents.record import Attempt, HoleRecord, Start, Stop
 from cell.core.documents.result import BodyResult, Outcome
-from cell.core.errors import CellError
+from cell.core.errors import CellError, DocumentError
 from cell.metrology.judge.decide import judge_run
 from cell.metrology.measure.hole import measure_hole
 from cell.programs.audit.compare import Comparison, Difference, compare
 from cell.programs.audit.consistency import contradictions
 from cell.programs.audit.question import Question
-from cell.programs.audit.report import Change, LogAudit
+from cell.programs.audit.report import Change, LogAudit, fault_of_the_program
 from cell.recording.audit_picture import AuditPicture
 from cell.recording.forms import as_recorded
 from cell.recording.integrity import Check, check_chain, check_images, check_seal
@@ -41,7 +41,8 @@ def unwatched(_holes: int) -> None:
 
 
 def audit_log(log: Path, question: Question = PLAIN, watch: Watch = unwatched) -> LogAudit:
-    """Audit one recording. Never raises for what is wrong with it: that is the answer.
+    """Audit one recording. Never raises: what is wrong with it is the answer, and a bug is one that
+    says nothing of it, so that the others are audited all the same.
 
     Args:
         log: the recording.
@@ -61,9 +62,21 @@ def audit_log(log: Path, question: Question = PLAIN, watch: Watch = unwatched) -
                 watch(count)
         return audit.close(log, seal, checks)
     except CellError as error:
-        return LogAudit(log, str(error), checks=tuple(checks))
-    except Exception as error:  # noqa: BLE001  whatever it holds must not stop the others
-        return LogAudit(log, f"cannot be measured again: {error!r}", checks=tuple(checks))
+        return LogAudit(log, str(error), error.exit_code, checks=tuple(checks))
+    except Exception as error:  # noqa: BLE001  one bug must not keep the others from their audit
+        return _stumbled(log, error, tuple(checks))
+
+
+def _stumbled(log: Path, error: Exception, checks: tuple[Check, ...]) -> LogAudit:
+    """Tell a recording that was altered, and may hold anything, from a bug over an intact one."""
+    try:
+        faults = [fault for page in read_pages(log) for fault in page.faults]
+    except DocumentError as damage:
+        faults = [str(damage)]
+    if altered := _not_intact(checks, faults):
+        return LogAudit(log, f"{altered}; what it holds now cannot be measured: {error!r}",
+                        checks=checks)
+    return fault_of_the_program(log, error, checks)
 
 
 def _refusal(checks: list[Check], seal: Seal | None, question: Question) -> str | None:
@@ -74,8 +87,8 @@ def _refusal(checks: list[Check], seal: Seal | None, question: Question) -> str 
     return "; ".join(failed) if failed and not question.unsealed else None
 
 
-def _not_intact(checks: Sequence[Check]) -> str | None:
-    failed = [check.words for check in checks if check.passed is False]
+def _not_intact(checks: Sequence[Check], faults: Sequence[str] = ()) -> str | None:
+    failed = [*(check.words for check in checks if check.passed is False), *faults]
     return f"not intact: {'; '.join(failed)}" if failed else None
 
 
@@ -131,12 +144,13 @@ class _Audit:
                   check_images(seal, self._missing), self._check_records()]
         return LogAudit(
             log, _not_intact(checks[-3:]) or self._unanswered(),
-            self._start.body_id, self._start.started, status, self._page.chain,
-            len(self._recorded), tuple(checks), self._numbers,
-            tuple(self._differences), _versions_that_differ(self._start), tuple(self._warnings),
-            self._skipped, recorded.verdict if recorded is not None else None, then.verdict,
-            _changes(recorded, then) if recorded is not None and self._what_if else (),
-            self._what_if)
+            body_id=self._start.body_id, started=self._start.started, status=status,
+            chain=self._page.chain, holes=len(self._recorded), checks=tuple(checks),
+            numbers=self._numbers, differences=tuple(self._differences),
+            versions=_versions_that_differ(self._start), warnings=tuple(self._warnings),
+            skipped=self._skipped, verdict_then=then.verdict, what_if=self._what_if,
+            verdict=recorded.verdict if recorded is not None else None,
+            changes=_changes(recorded, then) if recorded is not None and self._what_if else ())
 
     def _unanswered(self) -> str | None:
         """Say why a what-if that measures otherwise has no answer: there are no images."""

@@ -12,7 +12,7 @@ from pathlib import Path
 from cell.core.errors import DeviceError, DocumentError
 from cell.programs.audit.log import Watch, audit_log, unwatched
 from cell.programs.audit.question import Question
-from cell.programs.audit.report import LogAudit
+from cell.programs.audit.report import LogAudit, fault_of_the_program
 from cell.recording.guard import guarded
 
 
@@ -35,8 +35,8 @@ def _result(future: Future[LogAudit], log: Path, question: Question) -> LogAudit
         return future.result()
     except BrokenProcessPool:
         return _alone(log, question)
-    except Exception as error:  # noqa: BLE001  one broken recording must not stop the others
-        return LogAudit(log, f"the audit failed: {error!r}")
+    except Exception as error:  # noqa: BLE001  what the executor lost must not stop the others
+        return fault_of_the_program(log, error)
 
 
 def _alone(log: Path, question: Question) -> LogAudit:
