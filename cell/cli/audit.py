@@ -110,4 +110,4 @@ def _audit_with_progress(logs: Sequence[Path], question: Question, workers: int,
 def _exit_code(audits: Sequence[LogAudit], folders: Sequence[FolderAudit], strict: bool) -> int:
     """Take the worst: what failed before what is not intact, that before what differs."""
     codes = [each.exit_code(strict) for each in audits]
-    return max(codes + [NOT_INTACT for folder in folders if folder.findings], default=0)
+    return max(codes + [NOT_INTACT for folder in folders if folder.findings])

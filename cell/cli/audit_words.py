@@ -75,7 +75,7 @@ def print_row(audits: Sequence[LogAudit], folders: Sequence[FolderAudit]) -> Non
     if len(audits) != 1:
         words = [f"{sum(audit.answer == answer for audit in audits)} {answer}"
                  for answer in COLOURS if any(audit.answer == answer for audit in audits)]
-        answers.print(f"{len(audits)} recordings: {', '.join(words) or 'none'}", highlight=False)
+        answers.print(f"{len(audits)} recordings: {', '.join(words)}", highlight=False)
     for folder in folders:
         for finding in folder.findings:
             answers.print(f"[red]{finding.kind}[/] {escape(finding.file)}: "

@@ -5,11 +5,12 @@ from __future__ import annotations
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import typer
 
 from cell.cli.words import answers, console, print_json
+from cell.core.documents.result import BodyVerdict
 from cell.core.errors import OUT_OF_TOLERANCE, DocumentError
 
 if TYPE_CHECKING:
@@ -17,15 +18,17 @@ if TYPE_CHECKING:
 
 results_app = typer.Typer(
     name="results", no_args_is_help=True,
-    help="The results of all bodies: list, show, follow a trend, export CSV, rebuild.")
+    help="""The results of all bodies: list, show, follow a trend, export CSV, rebuild.
+
+Ends with 2 where no body matches what is asked for.""")
 
 LOGS = typer.Option(Path("logs"), "--logs", help="The folder of recordings and of the database.")
 URL = typer.Option(None, "--database", help="A plant's database, postgresql+psycopg://host/name.")
 SINCE = typer.Option(None, "--since", formats=["%Y-%m-%d", "%Y-%m-%dT%H:%M"], help="From, in UTC.")
 UNTIL = typer.Option(None, "--until", formats=["%Y-%m-%d", "%Y-%m-%dT%H:%M"], help="Up to, in UTC.")
 JOB = typer.Option("", "--job", help="Only this job's bodies.")
-VERDICT = typer.Option("", "--verdict", help="in_tolerance, out_of_tolerance, uncertain, "
-                       "incomplete.")
+VERDICTS = get_args(BodyVerdict)
+VERDICT = typer.Option("", "--verdict", help=f"{', '.join(VERDICTS)}.")
 PRODUCTION = typer.Option(False, "--production", help="Without trials.")
 LAST = typer.Option(None, "--last", min=1, help="Only the last so many.")
 JSON = typer.Option(False, "--json", help="Print one JSON object.")
@@ -37,11 +40,13 @@ def list_results(logs: Path = LOGS, database: str | None = URL, since: datetime 
                  production: bool = PRODUCTION, last: int | None = LAST,
                  as_json: bool = JSON) -> None:
     """List bodies, the latest first."""
-    from cell.programs.results import opened
+    from cell.programs.results import opened, refuse_nothing
     from cell.results.query import list_bodies
 
+    wanted = _filter(since, until, job, verdict, production, last)
     with opened(logs, database) as found:
-        rows = list_bodies(found, _filter(since, until, job, verdict, production, last))
+        refuse_nothing(found, wanted)
+        rows = list_bodies(found, wanted)
     if as_json:
         print_json({"bodies": rows})
     else:
@@ -77,6 +82,9 @@ def show_trend(feature: str, axis: str, logs: Path = LOGS, database: str | None 
 
     with opened(logs, database) as found:
         points = trend(found, feature, axis, _filter(since, until, "", "", production, last))
+    if not points:
+        raise DocumentError(f"no body that is asked for has an axis {axis!r} of a feature "
+                            f"{feature!r}")
     if as_json:
         print_json({"feature": feature, "axis": axis, "points": [vars(point) for point in points]})
         return
@@ -91,11 +99,12 @@ def export_results(to: Path = typer.Argument(..., help="The CSV file; - writes t
                    until: datetime | None = UNTIL, job: str = JOB, verdict: str = VERDICT,
                    production: bool = PRODUCTION, last: int | None = LAST) -> None:
     """Export every axis of the bodies as CSV, one line an axis."""
-    from cell.programs.results import opened, write_csv
+    from cell.programs.results import opened, refuse_nothing, write_csv
     from cell.results.query import export_rows
 
     wanted = _filter(since, until, job, verdict, production, last)
     with opened(logs, database) as found:
+        refuse_nothing(found, wanted)
         if str(to) == "-":
             count = write_csv(export_rows(found, wanted), sys.stdout)
         else:
@@ -133,6 +142,8 @@ def _filter(since: datetime | None, until: datetime | None, job: str, verdict: s
             production: bool, last: int | None) -> Filter:
     from cell.results.query import Filter
 
+    if verdict not in ("", *VERDICTS):
+        raise DocumentError(f"expected {', '.join(VERDICTS)}; came {verdict!r}", place="--verdict")
     return Filter(_seconds(since), _seconds(until), job, verdict, production_only=production,
                   last=last)
 

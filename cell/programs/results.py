@@ -19,6 +19,7 @@ from cell.metrology.judge.decide import judge_run
 from cell.recording.pages import PRUNED, read_pages
 from cell.results.booking import BodyRows, Booking, Row, body_rows, book
 from cell.results.database import Database, connect, open_database, recreate_results
+from cell.results.query import Filter, list_bodies
 from cell.results.tables import bodies
 
 FILE = "results.sqlite"
@@ -80,6 +81,20 @@ def read_rows(log: Path) -> BodyRows:
     left = None if stop else judge_run(papers, start, records)
     return body_rows(Booking(start, stop, papers.job.name, papers.station.name, log.name, chain,
                              left))
+
+
+def refuse_nothing(database: Database, wanted: Filter) -> None:
+    """Refuse a filter that no body matches: an empty answer would read as if all was well.
+
+    Raises:
+        DocumentError: says what there is.
+    """
+    if replace(wanted, last=None) == Filter() or list_bodies(database, replace(wanted, last=1)):
+        return
+    known = list_bodies(database, Filter())
+    raise DocumentError("no body matches; the database holds " + (
+        f"{len(known)}, from {utc(known[-1]['started'])} to {utc(known[0]['started'])}, of "
+        + ", ".join(sorted({row["job"] for row in known})) if known else "none yet"))
 
 
 def write_csv(rows: Iterable[Row], stream: TextIO) -> int:

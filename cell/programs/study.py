@@ -65,7 +65,15 @@ def study_repeatability(samples: Sequence[Sample],
 
 def study_type1(samples: Sequence[Sample], references: dict[str, float], tolerance: float,
                 rule: Type1Rule, confidence: float = 0.95) -> list[Finding[Type1]]:
-    """Study Cg and Cgk of every axis that has a reference value."""
+    """Study Cg and Cgk of every axis that has a reference value.
+
+    Raises:
+        DocumentError: a reference is of an axis that was not measured.
+    """
+    measured = dict.fromkeys(sample.axis for sample in samples)
+    if unknown := references.keys() - measured.keys():
+        raise DocumentError(f"of the axis {', '.join(sorted(unknown))} nothing was measured; "
+                            f"there is {', '.join(measured)}", place="--reference")
     return [_found(sample, lambda s: solve_type1(s.values, references[s.axis], tolerance, rule,
                                                  confidence))
             for sample in samples if sample.axis in references]
@@ -85,13 +93,16 @@ def read_samples(files: Sequence[Path]) -> list[Sample]:
     An empty number is a value that was not measured: it is left out, never taken as 0.
 
     Raises:
-        DocumentError: a file cannot be read, a column is missing, or a cell is not a number.
+        DocumentError: a file cannot be read, a column is missing, a cell is not a number, or there
+            is no number at all.
     """
     rows = [row for file in files
             for row in (_recorded_rows if file.suffix == ".rrd" else _rows)(file)]
     features = dict.fromkeys(row["id"] for row in rows)
     samples = [_sample([row for row in rows if row["id"] == feature], feature, axis)
                for feature in features for axis in AXES]
+    if not any(sample.values.size for sample in samples):
+        raise DocumentError("nothing was measured", source=", ".join(map(str, files)))
     return [sample for sample in samples if sample.values.size]
 
 

@@ -109,6 +109,15 @@ def test_a_fault_of_the_program_ends_with_70_and_the_others_are_audited(cell, ke
     assert 'raise KeyError("nowhere")' in said.err
 
 
+def test_an_audit_of_nothing_is_refused(cell, keys, tmp_path):
+    log = record_body(tmp_path / "body.rrd", holes=())
+    assert cell("audit", log, "--since", "2020-01-01")[0] == 0
+    code, words = cell("audit", log, "--since", "2099-01-01", "--json")
+    answer = json.loads(words)
+    assert (code, answer["ok"]) == (2, False)
+    assert "none of 1 recordings began since 2099-01-01 00:00" in answer["detail"]
+
+
 @pytest.mark.parametrize("words", [["audit", "nowhere.rrd"], ["repair", "nowhere.rrd"],
                                    ["prune", "nowhere.rrd"], ["view", "nowhere.rrd"],
                                    ["audit", ".", "--since", "lately"],

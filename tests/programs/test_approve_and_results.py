@@ -99,10 +99,23 @@ def test_results_are_exported(logs, tmp_path):
 
 @pytest.mark.parametrize(("words", "said"), [
     (("results", "show", "nobody"), "no body or recording"),
+    (("results", "list", "--job", "demmo"), "no body matches; the database holds 3, from 2023-11-"),
+    (("results", "list", "--since", "2099-01-01", "--last", "1"), "no body matches"),
+    (("results", "list", "--verdict", "good"), "expected in_tolerance, out_of_tolerance, "),
+    (("results", "export", "-", "--until", "1999-01-01"), "no body matches"),
+    (("results", "trend", "H9", "x"), "an axis 'x' of a feature 'H9'"),
+    (("results", "trend", "H0", "x", "--since", "2099-01-01"), "no body that is asked for"),
     (("results", "export", "absent/out.csv"), "cannot be written")])
 def test_what_is_not_there_is_said(logs, words, said):
     answer = _ask(*words, "--logs", logs)
     assert isinstance(answer.exception, DocumentError) and said in str(answer.exception)
+
+
+def test_an_empty_database_is_listed_as_such(tmp_path):
+    answer = _ask("results", "list", "--logs", tmp_path, "--last", 3, "--json")
+    assert (answer.exit_code, json.loads(answer.stdout)) == (0, {"bodies": []})
+    answer = _ask("results", "list", "--logs", tmp_path, "--production")
+    assert "the database holds none yet" in str(answer.exception)
 
 
 def test_results_without_a_folder_are_refused(tmp_path):

@@ -65,8 +65,16 @@ def test_what_was_not_measured_is_left_out(tmp_path):
     assert samples == {"x": [1.0, 3.0], "y": [2.0]}
 
 
+def test_a_reference_of_what_was_not_measured_is_refused(table_1):
+    answer = _ask("type1", table_1, "--reference", "d=12.0", "--tolerance", 1.0)
+    assert isinstance(answer.exception, DocumentError)
+    assert "axis d nothing was measured; there is x, y, z" in str(answer.exception)
+
+
 @pytest.mark.parametrize(("text", "words"), [
-    ("", "empty file"), ("name,x\nA,1\n", "column `id`"), ("id,x\nA,one\n", "line 2, column x"),
+    ("", "empty file"), ("id,x\n", "nothing was measured"),
+    ("id,x\nA,\n", "nothing was measured"), ("name,x\nA,1\n", "column `id`"),
+    ("id,x\nA,one\n", "line 2, column x"),
     ("id,x\nA,nan\n", "line 2"), (None, "cannot be read"),
 ])
 def test_a_bad_table_is_refused_with_its_place(tmp_path, text, words):

@@ -45,8 +45,19 @@ def gather_logs(paths: Sequence[Path]) -> tuple[list[Path], list[FolderAudit]]:
 
 
 def started_since(logs: Sequence[Path], moment: datetime) -> list[Path]:
-    """Keep the recordings begun at or after a moment, and those that cannot tell."""
-    return [log for log in logs if (_started(log) or moment.timestamp()) >= moment.timestamp()]
+    """Keep the recordings begun at or after a moment, and those that cannot tell.
+
+    Raises:
+        DocumentError: there is none: an audit of nothing would read as if all was well.
+    """
+    began = {log: _started(log) for log in logs}
+    kept = [log for log, at in began.items() if at is None or at >= moment.timestamp()]
+    if not kept:
+        last = datetime.fromtimestamp(max(at for at in began.values() if at is not None),
+                                      moment.tzinfo)
+        raise DocumentError(f"none of {len(logs)} recordings began since {moment:%Y-%m-%d %H:%M}; "
+                            f"the last one began {last:%Y-%m-%d %H:%M}", place="--since")
+    return kept
 
 
 def parse_since(words: str, now: datetime) -> datetime:
