@@ -101,4 +101,4 @@ def _open_camera(document: StationDocument, folder: Path, address: str,
     if camera.scene is None:
         raise DocumentError("a camera with `driver: sim` needs its `scene`",
                             source=f"cell {document.name}", place="camera.scene")
-    return SimulatedCamera(folder / camera.scene, address, speed)
+    return SimulatedCamera(folder / camera.scene, address, speed, camera.timeout_s)

@@ -37,11 +37,12 @@ class SimulatedCamera:
 
     It learns from the controller at `controller_address` over RTDE where the robot stands and which
     lights burn. `speed` is how much faster than real time an exposure passes; `timeout` is how long
-    an image may take beyond that (rendering included), in seconds on the wall.
+    an image may take beyond that (rendering included), and how long re-arming may, in seconds on
+    the wall: the laser burns meanwhile.
     """
 
     def __init__(self, scene_path: Path, controller_address: str, speed: float = 1.0,
-                 timeout: float = 10.0) -> None:
+                 timeout: float = 2.0) -> None:
         self._path, self._address = scene_path, controller_address
         self._speed, self._timeout = speed, timeout
         self._scene: SceneDocument = read_scene(scene_path)
@@ -124,7 +125,7 @@ class SimulatedCamera:
         """Throw away what is queued or under way: no earlier image can come after this."""
         token = next(self._tokens)
         self._tell("rearm", token)
-        while self._answer("armed") != token:
+        while self._answer("armed", self._timeout) != token:
             pass
         self._images.clear()
 

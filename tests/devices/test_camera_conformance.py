@@ -28,7 +28,7 @@ class SimulatedStage:
         self.controller.outputs = int(on)
 
     def lose_an_image(self):
-        self.camera._timeout = 0.1
+        self.camera._timeout = 0.5
         self.camera.set_fault("late_image", 1)
 
     def find_it_again(self):

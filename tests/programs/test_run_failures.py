@@ -1,16 +1,20 @@
 """What `cell run` does when something is wrong: one clear message, the right code, nothing lost."""
 
 import json
+import os
 import resource
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from cell.core.errors import DeviceError, DocumentError
 from cell.programs.inspection import BodyInspection, prepare
+from cell.programs.inspection.look import look
 from cell.programs.run import Request, begin, measure, run_job
 from cell.programs.station import open_station
 from cell.recording import Recorder, read
@@ -116,6 +120,28 @@ def test_a_camera_that_fails_stops_the_run_and_the_recording_says_so(
         with pytest.raises(DeviceError, match=words):
             measure(inspection)
     assert read(log).status == "fault"
+
+
+def test_a_camera_that_hangs_darkens_the_laser_after_the_time_out_of_its_cell(
+        plant: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with EmulatedController("ur10e", joints=np.radians(HOME_DEG)) as controller:
+        change(plant / "calibration/demo/cell.yaml", "driver: sim\n  model: ur10e",
+               f"driver: ur\n  address: {controller.address}\n  model: ur10e")
+        change(plant / "calibration/demo/cell.yaml", "scene: scene.yaml",
+               "scene: scene.yaml\n  timeout_s: 0.75")
+        prepared = prepare(Path("jobs/demo.yaml"))
+        with open_station(prepared.papers.station, prepared.folder) as station:
+            switch = station.lights.set
+
+            def switch_and_hang(light: str) -> None:
+                switch(light)
+                if light == "laser":
+                    os.kill(station.world._process.pid, signal.SIGSTOP)
+
+            monkeypatch.setattr(station.lights, "set", switch_and_hang)
+            with pytest.raises(DeviceError, match=r"no answer within 0\.75 s"):
+                look(station, {"ring": 0.008, "laser": 0.004}, 0)
+            assert json.loads(controller.tell_referee("truth"))["outputs"] == 0
 
 
 def test_a_protective_stop_ends_the_run_with_the_arm_at_rest_and_the_laser_off(

@@ -58,7 +58,7 @@ class CameraSettings(Document):
     """The camera. `driver: sim` looks at the scene of `scene`; `driver: video` opens `source` (an
     index, a device or a stream address) through OpenCV. `stale_s` is how old an image of a video
     source may be when it arrives: its exposure, transfer and buffers; `timeout_s` how long it may
-    keep waiting beyond that (a simulated camera, which has to render, has a limit of its own).
+    keep waiting beyond that, while the laser burns (a simulated camera renders in that time).
     """
 
     driver: Literal["sim", "video"]
