@@ -19,6 +19,7 @@ from cell.metrology.judge.align import check_alignment
 from cell.metrology.judge.datum import UndeterminedError
 from cell.metrology.judge.decide import Circumstances, sort_offsets
 from cell.metrology.plan.stops import Plan, PlannedStop, draw_plan
+from cell.recording.room import check_recordable
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,7 @@ def check_job(job: Path, cell: str | None = None, logs: Path = Path("logs")) -> 
     """
     papers = read_papers(job, cell).parse()
     check_logs(logs)
+    check_recordable(logs)
     try:
         check_alignment(papers.job.alignment, papers.holes)
     except UndeterminedError as loose:

@@ -21,6 +21,7 @@ from cell.programs.report import write_page
 from cell.programs.station import Station, open_station
 from cell.recording import Recorder, collect_versions
 from cell.recording.live import LiveView
+from cell.recording.room import check_recordable
 from cell.report.body import BodyRun, body_report
 
 BODY_ID = re.compile(r"[^\x00-\x1f\x7f-\x9f\u2028\u2029]{1,100}")
@@ -70,6 +71,7 @@ def run_job(request: Request, watch: Watch) -> Finished:
     prepared = prepare(request.job, request.cell)
     _check_options(request, prepared)
     log = new_log(request.logs, prepared.papers.job.name)
+    check_recordable(request.logs)
     body_id = request.body_id or f"{prepared.papers.job.name}-{secrets.token_hex(4)}"
     watch(0, len(prepared.stops), "opening the cell")
     with (open_station(prepared.papers.station, prepared.folder, request.speed) as station,

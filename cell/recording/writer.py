@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -22,11 +21,9 @@ from cell.recording.forms import Plain, form_of
 from cell.recording.hole_scene import order_of_views
 from cell.recording.keys import key_path, read_key
 from cell.recording.picture import Picture
+from cell.recording.room import missing_room
 from cell.recording.seal import Closed, write_seal
 from cell.recording.stream import Stream
-
-ROOM = 200e6
-"""Bytes that must be free before a body: some 300 holes."""
 
 WAITING = 1
 """Holes that may wait for the disk before `write_hole` waits too: this bounds what a kill costs."""
@@ -161,10 +158,8 @@ class Recorder:
 def _new_stream(path: Path, recording_id: str) -> Stream:
     """Create the file, which no other run can then take, where its disk has room for a body."""
     try:
-        free = shutil.disk_usage(path.parent).free
-        if free < ROOM:
-            raise DocumentError(f"{free / 1e6:.0f} MB are free on its disk; {ROOM / 1e6:.0f} MB "
-                                "are needed before a body is begun", source=str(path))
+        if missing := missing_room(path.parent):
+            raise DocumentError(missing, source=str(path))
         return Stream(path, recording_id)
     except FileExistsError:
         raise DocumentError("exists already; a recording is never overwritten",

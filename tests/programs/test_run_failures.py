@@ -7,17 +7,21 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cell.core.errors import DeviceError, DocumentError
+from cell.programs.check import check_job
 from cell.programs.inspection import BodyInspection, prepare
 from cell.programs.inspection.look import look
 from cell.programs.run import Request, begin, measure, run_job
+from cell.programs.shift.run import ShiftRequest, run_shift
 from cell.programs.station import open_station
 from cell.recording import Recorder, read
+from cell.recording.keys import new_key
 from cell.sim.controller.process import EmulatedController
 
 HOME_DEG = [137.939, -109.974, 123.23, 1.512, 47.073, 157.747]
@@ -173,5 +177,35 @@ def test_what_could_not_be_kept_is_refused_before_the_cell_is_opened(plant: Path
     with pytest.raises(DocumentError):
         run_job(Request(Path("jobs/demo.yaml"), **words), pytest.fail)
     assert not (plant / "logs").exists()
+
+
+@pytest.fixture(params=["cell run", "cell shift", "cell check"])
+def begun(request: pytest.FixtureRequest) -> Callable[[], object]:
+    """The programs that record, up to where they would open the cell, or that foretell it."""
+    return {"cell run": lambda: run_job(Request(Path("jobs/demo.yaml")), pytest.fail),
+            "cell shift": lambda: run_shift(ShiftRequest(Path("jobs/demo_shift.yaml")),
+                                            pytest.fail, pytest.fail),
+            "cell check": lambda: check_job(Path("jobs/demo.yaml"))}[request.param]
+
+
+def test_a_disk_that_is_nearly_full_is_refused_before_the_cell_is_opened(
+        plant: Path, begun: Callable[[], object], monkeypatch: pytest.MonkeyPatch) -> None:
+    usage = shutil.disk_usage(plant)._replace(free=150_000_000)
+    monkeypatch.setattr("shutil.disk_usage", lambda _: usage)
+    monkeypatch.setattr(subprocess, "Popen", pytest.fail)  # no device, no simulator
+    with pytest.raises(DocumentError, match="150 MB are free on its disk; 200 MB are needed"):
+        begun()
+    assert list((plant / "logs").iterdir()) == []
+
+
+def test_a_key_that_others_can_read_is_refused_before_the_cell_is_opened(
+        plant: Path, begun: Callable[[], object], monkeypatch: pytest.MonkeyPatch) -> None:
+    new_key(plant / "seal.key")
+    (plant / "seal.key").chmod(0o644)
+    monkeypatch.setenv("CELL_SEAL_KEY", str(plant / "seal.key"))
+    monkeypatch.setattr(subprocess, "Popen", pytest.fail)
+    with pytest.raises(DocumentError, match="others can use this key"):
+        begun()
+    assert list((plant / "logs").iterdir()) == []
 
 

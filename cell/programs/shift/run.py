@@ -29,6 +29,7 @@ from cell.programs.shift.measuring import Measuring
 from cell.programs.shift.station_cell import StationCell
 from cell.programs.station import Station, open_station
 from cell.recording.live import LiveView
+from cell.recording.room import check_recordable
 from cell.results.approvals import approved
 from cell.results.booking import Row
 from cell.results.database import Database, open_database
@@ -80,6 +81,7 @@ def run_shift(request: ShiftRequest, show: Callable[[Board], None],
     document, jobs = read_shift(request.file)
     _check_options(request, jobs)
     check_logs(request.logs)
+    check_recordable(request.logs)
     with ExitStack() as closing:
         database = open_database(request.logs / FILE)
         closing.callback(database.close)

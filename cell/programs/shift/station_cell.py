@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -18,8 +17,9 @@ from cell.programs.run import begin
 from cell.programs.shift.work import Begun, PreparedJob
 from cell.programs.station import Station
 from cell.recording import Recorder
+from cell.recording.room import missing_room
 from cell.recording.seal import read_seal, seal_path
-from cell.recording.writer import ROOM, Show
+from cell.recording.writer import Show
 
 
 class StationCell:
@@ -61,11 +61,9 @@ class StationCell:
         self._station.camera.open()
 
     def _check_room(self) -> None:
-        free = shutil.disk_usage(self._logs).free
-        if free < ROOM:
+        if missing := missing_room(self._logs):
             full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-            raise RecordingError(f"{free / 1e6:.0f} MB are free in {self._logs}, {ROOM / 1e6:.0f} "
-                                 "MB are needed before a body is begun") from full
+            raise RecordingError(f"{self._logs}: {missing}") from full
 
 
 def prepare_job(prepared: Prepared) -> PreparedJob:
