@@ -1,0 +1,65 @@
+"""What a punch leaves round a hole: a burr that stands up, or a die roll that falls away.
+
+A rim is a height over the plan: `depth(distance, angle)` is how far the surface lies below the
+sheet's face (above it: negative), at a distance from the bore's wall, mm, and an angle round it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Round:
+    """A quantity that varies round the hole: mean times 1 + sum of cosines, never above `most`."""
+
+    mean: float
+    waves: tuple = ()  # of (order, amplitude, phase)
+    most: float = np.inf
+
+    def at(self, angle):
+        value = np.ones_like(angle)
+        for order, amplitude, phase in self.waves:
+            value = value + amplitude * np.cos(order * angle + phase)
+        return np.clip(self.mean * value, 0.15 * self.mean, self.most)
+
+
+@dataclass(frozen=True)
+class DieRoll:
+    """A rounded edge: a quarter of a circle from the face into the bore."""
+
+    radius: Round
+
+    @property
+    def width(self):
+        return self.radius.most
+
+    @property
+    def span(self):
+        """Give the highest and the lowest depth of the rim."""
+        return 0.0, self.radius.most
+
+    def depth(self, distance, angle):
+        radius = self.radius.at(angle)
+        into = np.clip(radius - distance, 0.0, radius)
+        return radius - np.sqrt(radius * radius - into * into)
+
+
+@dataclass(frozen=True)
+class Burr:
+    """A raised lip: `slender` times as high as wide, highest at the bore."""
+
+    lip: Round
+    slender: float
+
+    @property
+    def width(self):
+        return self.lip.most
+
+    @property
+    def span(self):
+        return -self.slender * self.lip.most, 0.0
+
+    def depth(self, distance, angle):
+        lip = self.lip.at(angle)
+        return -self.slender * lip * np.cos(np.clip(distance / lip, 0.0, 1.0) * np.pi / 2.0) ** 2
