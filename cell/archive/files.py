@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
 
@@ -62,6 +63,46 @@ def replace_text(path: Path, text: str) -> None:
     except OSError as error:
         beside.unlink(missing_ok=True)
         raise DocumentError(f"cannot be written: {error.strerror}", source=str(path)) from None
+
+
+def append_line(path: Path, line: str) -> None:
+    """Add a line to a file of lines, made where there is none; on return it is on the disk.
+
+    A line before it that was cut short stays cut short: it does not grow together with this one.
+
+    Raises:
+        DocumentError: the disk refuses; what was written before is whole.
+    """
+    try:
+        path.parent.mkdir(exist_ok=True)
+        known = path.read_bytes() if path.exists() else b""
+        cut = b"\n" if known and not known.endswith(b"\n") else b""
+        with path.open("ab") as stream:
+            stream.write(cut + line.encode() + b"\n")
+            stream.flush()
+            os.fsync(stream.fileno())
+    except OSError as error:
+        raise DocumentError(f"cannot be written: {error.strerror}", source=str(path)) from None
+
+
+def read_json_lines(path: Path) -> list[str]:
+    """Read the lines of a file of JSON lines, none where there is no file.
+
+    A line that was cut short does not count: whoever wrote it did not come to the end.
+
+    Raises:
+        DocumentError: the file cannot be read.
+    """
+    lines = read_text(path).splitlines() if path.exists() else []
+    return [line for line in lines if _is_json(line)]
+
+
+def _is_json(line: str) -> bool:
+    try:
+        json.loads(line)
+    except ValueError:
+        return False
+    return True
 
 
 def sync(path: Path) -> None:

@@ -16,7 +16,7 @@ from cell.core.documents.papers import Papers
 from cell.core.documents.record import HoleRecord, Start, Stop
 from cell.core.errors import DocumentError
 from cell.metrology.judge.decide import judge_run
-from cell.recording.pages import PRUNED, read_pages
+from cell.recording.pages import read_pages, without_images
 from cell.results.booking import BodyRows, Booking, Row, body_rows, book
 from cell.results.database import Database, connect, open_database, recreate_results
 from cell.results.query import Filter, list_bodies
@@ -127,13 +127,8 @@ def _papers_of(log: Path) -> tuple[Start, list[HoleRecord], Stop | None, str]:
         if isinstance(page.record, Start):
             start = page.record
         elif isinstance(page.record, HoleRecord):
-            records.append(_without_images(page.record))
+            records.append(without_images(page.record))
         elif isinstance(page.record, Stop):
             stop = page.record
     assert start is not None  # `read_pages` sees to it
     return start, records, stop, chain
-
-
-def _without_images(record: HoleRecord) -> HoleRecord:
-    views = tuple(replace(view, image=PRUNED) for view in record.observation.views)
-    return replace(record, observation=replace(record.observation, views=views))

@@ -20,8 +20,7 @@ from cell.core.geometry import Transform
 from cell.programs.calibration.belief import read_belief
 from cell.programs.calibration.session import Session
 from cell.programs.calibration.shown import Shown
-from cell.programs.calibration.solve import solve_session
-from cell.programs.calibration.stillness import before_and_after
+from cell.programs.calibration.solve import before_and_after, solve_session
 from cell.programs.calibration.wizard import Request, conclude, run_wizard
 
 ROOT = Path(__file__).parents[2]

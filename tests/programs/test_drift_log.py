@@ -12,7 +12,7 @@ from cell.core.documents.calibration import BodyDocument
 from cell.core.documents.text import parse
 from cell.core.errors import DocumentError
 from cell.core.geometry import Transform
-from cell.programs.calibration.drift_log import append_line, read_past
+from cell.programs.calibration.drift_log import append_check, read_past
 from cell.programs.calibration.registrations import apply_corrections, plan_corrections
 
 ROOT = Path(__file__).parents[2]
@@ -63,16 +63,16 @@ def test_registrations_of_other_sets_stay_as_they_are(folder):
 
 def test_a_correction_is_the_new_reference_and_a_registration_starts_anew(folder):
     for alarm in ("reference", "ok", "corrected", "warn"):
-        append_line(folder, "s", {"alarm": alarm})
-    append_line(folder, "other", {"alarm": "ok"})
+        append_check(folder, "s", {"alarm": alarm})
+    append_check(folder, "other", {"alarm": "ok"})
     assert [line["alarm"] for line in read_past(folder, "s")] == ["corrected", "warn"]
-    append_line(folder, "s", {"alarm": "registered"})
+    append_check(folder, "s", {"alarm": "registered"})
     assert read_past(folder, "s") == []
 
 
 def test_a_line_that_was_cut_short_does_not_count(folder):
-    append_line(folder, "s", {"alarm": "reference"})
+    append_check(folder, "s", {"alarm": "reference"})
     with (folder / "drift" / "log.jsonl").open("a") as log:
         log.write('{"at": "2026')
-    append_line(folder, "s", {"alarm": "ok"})
+    append_check(folder, "s", {"alarm": "ok"})
     assert [line["alarm"] for line in read_past(folder, "s")] == ["reference", "ok"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, TypeAlias
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
@@ -29,3 +30,15 @@ Matrix3: TypeAlias = tuple[Vector3, Vector3, Vector3]
 Matrix4: TypeAlias = Annotated[tuple[Vector4, Vector4, Vector4, Vector4],
                                AfterValidator(_a_rotation)]
 """A rigid transform, row by row, mm."""
+
+
+def as_rows(transform: Transform) -> Matrix4:
+    """Write a transform as a document has it."""
+    a, b, c, d = (tuple(float(value) for value in row) for row in transform.matrix)
+    return a, b, c, d  # type: ignore[return-value]  # four rows of four
+
+
+def as_six(values: Sequence[float]) -> Vector6:
+    """Write six numbers as a document has them."""
+    a, b, c, d, e, f = (float(value) for value in values)
+    return a, b, c, d, e, f

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from cell.archive.papers import read_papers
+from cell.core.documents.base import as_rows
 from cell.core.documents.calibration import BodyDocument
 from cell.core.documents.nominals import Hole
 from cell.core.documents.record import HoleRecord
@@ -25,8 +26,7 @@ from cell.metrology.judge.datum import (
     solve_body_registration,
 )
 from cell.metrology.plan.stops import PlannedStop
-from cell.programs.calibration.capture import as_rows
-from cell.programs.calibration.drift_log import REGISTERED, append_line
+from cell.programs.calibration.drift_log import REGISTERED, append_check
 from cell.programs.calibration.recorded import read_gates
 from cell.programs.calibration.registrations import write_registration
 from cell.programs.inspection.chase import Chase
@@ -181,6 +181,6 @@ def _write(registration: Registration, prepared: Prepared, datums: list[Datum]) 
         calibration_set=prepared.papers.set_id,
         covariance=tuple(tuple(float(value) for value in row) for row in rows),  # type: ignore[arg-type]
         datums=tuple(datum.id for datum in datums))
-    append_line(prepared.folder, prepared.papers.set_id, {"alarm": REGISTERED, "job": job})
+    append_check(prepared.folder, prepared.papers.set_id, {"alarm": REGISTERED, "job": job})
     write_registration(file, document)
     return file

@@ -6,9 +6,8 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from cell.core.documents.base import Matrix4, Vector6
+from cell.core.documents.base import as_rows, as_six
 from cell.core.documents.calibration_session import ViewRecord
-from cell.core.geometry import Transform
 from cell.core.observation import View
 from cell.core.ports import Joints, Move
 from cell.programs.calibration.session import Session
@@ -109,15 +108,3 @@ def record_skipped(session: Session, number: int, station: Station, status: str)
         number=number, purpose=target.purpose, place=target.place, joints=as_six(state.joints),
         base_from_flange=here, base_from_flange_after=here, time=time.time(), ring="", stripe="",
         status=status))
-
-
-def as_rows(transform: Transform) -> Matrix4:
-    """Write a transform as a document has it."""
-    a, b, c, d = (tuple(float(value) for value in row) for row in transform.matrix)
-    return a, b, c, d  # type: ignore[return-value]  # four rows of four
-
-
-def as_six(values: Sequence[float]) -> Vector6:
-    """Write six numbers as a document has them."""
-    a, b, c, d, e, f = (float(value) for value in values)
-    return a, b, c, d, e, f

@@ -20,7 +20,7 @@ from cell.metrology.calibrate.gates import Checked, Level, worst
 from cell.metrology.study.drift import Drift, judge_drift
 from cell.programs.calibration.belief import Belief, design_of, read_belief
 from cell.programs.calibration.capture import drive, shoot
-from cell.programs.calibration.drift_log import CORRECTED, append_line, read_past
+from cell.programs.calibration.drift_log import CORRECTED, append_check, read_past
 from cell.programs.calibration.poses import free_path, plan_poses, plan_sphere, plan_start
 from cell.programs.calibration.recorded import read_gates
 from cell.programs.calibration.registrations import apply_corrections, plan_corrections
@@ -154,7 +154,7 @@ def _judge(places: dict[str, Array], past: list[dict[str, Any]], gates: Level) -
 
 def _log(belief: Belief, checked: CheckedCell) -> None:
     drift = checked.drift
-    append_line(belief.folder, belief.set_id, {
+    append_check(belief.folder, belief.set_id, {
         "alarm": checked.alarm, **_measured(checked),
         "average": None if drift is None else drift.average.tolist(),
         "left_over_mm": None if drift is None else drift.left_over})
@@ -182,7 +182,7 @@ def _correct(belief: Belief, checked: CheckedCell, operator: Operator) -> bool:
     if not operator.confirm(f"Correct the registrations of {', '.join(corrections) or 'nothing'} "
                             f"by {shift:.3f} mm and {np.degrees(turn):.4f} degrees?"):
         return False
-    append_line(belief.folder, belief.set_id, {
+    append_check(belief.folder, belief.set_id, {
         "alarm": CORRECTED, **_measured(checked), "average": None, "left_over_mm": drift.left_over,
         "corrections": corrections})
     apply_corrections(belief.folder, corrections)

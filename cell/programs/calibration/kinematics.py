@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
+from cell.core.documents.base import as_six
 from cell.core.documents.calibration import KinematicsDocument
-from cell.core.geometry import Array
 from cell.core.optics import CameraModel
 from cell.metrology.calibrate.board_pose import locate_boards
 from cell.metrology.calibrate.hand_eye.calibration import HandEyeAnswer
 from cell.metrology.calibrate.kinematics import JointView, KinematicResult, solve_kinematics
 from cell.programs.calibration.belief import Belief
-from cell.programs.calibration.capture import as_six
 from cell.programs.calibration.chain import Chain
 from cell.programs.calibration.seen import SeenView
+from cell.programs.calibration.stillness import measure_scatter
 
 PLACES = 2  # of boards, at least
 GAIN = 0.9  # of what the views kept apart have without, at most: less is chance
@@ -65,26 +63,13 @@ def find_kinematics(views: Sequence[SeenView], camera: CameraModel, answer: Hand
         [JointView(view.record.joints, board, str(view.record.place), view.record.pose)
          for view, board in zip(fitted, boards, strict=True)], belief.arm, mount)
     document = _document(result, belief.station.robot.model)
+    with_rows = Chain(result.flange_from_camera, document)
     return KinematicsFound(result, document, len({view.record.place for view in fitted}),
-                           _restless(apart, camera, Chain(mount)),
-                           _restless(apart, camera, Chain(result.flange_from_camera, document)))
+                           measure_scatter(apart, camera, Chain(mount)),
+                           measure_scatter(apart, camera, with_rows))
 
 
 def _document(result: KinematicResult, model: str) -> KinematicsDocument:
     a, d, alpha, theta = (as_six([float(value) for value in part])
                           for part in result.residuals.reshape(4, 6))
     return KinematicsDocument(model=model, a=a, d=d, alpha=alpha, theta=theta)
-
-
-def _restless(views: Sequence[SeenView], camera: CameraModel, chain: Chain) -> float:
-    """How far the middle of a board moves between the views of its place: mm, rms."""
-    middle = np.concatenate([view.board.points_in_board for view in views]).mean(axis=0)
-    places: dict[int, list[Array]] = {}
-    for view, board in zip(views, locate_boards([view.board for view in views], camera),
-                           strict=True):
-        point = (chain.base_from_camera(view.record.pose, view.record.joints)
-                 @ board.camera_from_board @ middle)
-        places.setdefault(view.record.place, []).append(point)
-    off = np.concatenate([np.array(points) - np.mean(points, axis=0)
-                          for points in places.values()])
-    return float(np.sqrt(np.mean(np.sum(off ** 2, axis=1))))

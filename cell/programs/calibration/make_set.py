@@ -9,15 +9,14 @@ import numpy as np
 
 from cell.archive.files import replace_text
 from cell.archive.sets import write_set
+from cell.core.documents.base import as_rows
 from cell.core.documents.calibration import HandEyeDocument, SensorDocument
 from cell.core.documents.calibration_session import SessionHeader
 from cell.core.documents.text import dump
 from cell.core.geometry import Array
 from cell.programs.calibration.belief import Belief
-from cell.programs.calibration.capture import as_rows
 from cell.programs.calibration.session import Session
-from cell.programs.calibration.solve import Solution, chain_of
-from cell.programs.calibration.stillness import before_and_after
+from cell.programs.calibration.solve import Solution, before_and_after, chain_of
 from cell.report.calibration import CalibrationPage, calibration_report
 
 

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+from cell.core.documents.base import as_six
 from cell.core.documents.calibration import RobotRecord
 from cell.core.documents.calibration_session import (
     CalibrationPlan,
@@ -24,7 +25,7 @@ from cell.core.errors import DocumentError, UnmeasurableError
 from cell.core.geometry import Transform
 from cell.core.ports import Operator, RobotIdentity
 from cell.programs.calibration.belief import Belief, design_of
-from cell.programs.calibration.capture import as_six, describe, drive, shoot
+from cell.programs.calibration.capture import describe, drive, shoot
 from cell.programs.calibration.gathering import SAY_KEYS
 from cell.programs.calibration.poses import free_path, plan_poses, plan_sphere, plan_start
 from cell.programs.calibration.preconditions import (
@@ -35,9 +36,9 @@ from cell.programs.calibration.preconditions import (
 from cell.programs.calibration.seen import SeenView, see_again, see_view
 from cell.programs.calibration.session import Session, latest_session
 from cell.programs.calibration.shown import Shown
-from cell.programs.calibration.solve import board_shift
 from cell.programs.calibration.sphere import choose_sphere
 from cell.programs.calibration.start_view import StartView
+from cell.programs.calibration.stillness import measure_shift
 from cell.programs.station import Station
 
 SAME_PLACE = 0.1  # mm by which an old view may differ before a session is gone on with
@@ -186,8 +187,8 @@ class Opening:
         here = self.station.robot.state().joints
         drive(self.station, free_path(self.belief, here, view.joints, self.belief.home,
                                       boards[view.place].start))
-        shift = board_shift(see_again(view, session, self.belief), self._look(view, session),
-                            self.belief)
+        shift = measure_shift(see_again(view, session, self.belief), self._look(view, session),
+                              self.belief.sensor.camera, self.belief.chain)
         if shift > SAME_PLACE:
             raise DocumentError(f"the board stands {shift:.2f} mm from where it stood: begin again",
                                 source=str(session.folder))

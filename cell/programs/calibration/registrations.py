@@ -8,13 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from cell.archive.files import read_text, replace_text
-from cell.core.documents.base import Matrix4
+from cell.core.documents.base import Matrix4, as_rows
 from cell.core.documents.calibration import BodyDocument
 from cell.core.documents.text import dump, parse
 from cell.core.errors import DocumentError
 from cell.core.geometry import Transform
 from cell.metrology.study.drift import is_small
-from cell.programs.calibration.capture import as_rows
 
 
 def write_registration(file: Path, document: BodyDocument) -> None:

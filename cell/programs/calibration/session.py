@@ -9,7 +9,7 @@ from pathlib import Path
 
 import cv2
 
-from cell.archive.files import read_text, replace_text, sync
+from cell.archive.files import append_line, read_json_lines, read_text, replace_text, sync
 from cell.archive.images import read_image
 from cell.core.documents.calibration_session import SCHEMA, SessionHeader, ViewRecord
 from cell.core.errors import DocumentError
@@ -64,9 +64,8 @@ class Session:
 
     def _lines(self) -> list[ViewRecord]:
         file = self.folder / VIEWS
-        lines = read_text(file).splitlines() if file.exists() else []
         try:
-            return [ViewRecord.model_validate_json(line) for line in lines if _is_whole(line)]
+            return [ViewRecord.model_validate_json(line) for line in read_json_lines(file)]
         except ValueError:
             raise _of_another_version(file, self.header.version) from None
 
@@ -76,16 +75,7 @@ class Session:
         Raises:
             DocumentError: the disk refuses; what was written before is whole.
         """
-        file = self.folder / VIEWS
-        known = file.read_bytes() if file.exists() else b""
-        cut = b"\n" if known and not known.endswith(b"\n") else b""
-        try:
-            with file.open("ab") as stream:
-                stream.write(cut + view.model_dump_json().encode() + b"\n")
-                stream.flush()
-                os.fsync(stream.fileno())
-        except OSError as error:
-            raise DocumentError(f"cannot be written: {error.strerror}", source=str(file)) from None
+        append_line(self.folder / VIEWS, view.model_dump_json())
 
     def write_image(self, name: str, image: Image) -> str:
         """Keep a picture; on return it is on the disk. Returns its name in the folder."""
@@ -136,11 +126,3 @@ def _version(text: str) -> object:
         return json.loads(text).get("version", "unknown")
     except (ValueError, AttributeError):
         return "unknown"
-
-
-def _is_whole(line: str) -> bool:
-    try:
-        json.loads(line)
-    except json.JSONDecodeError:
-        return False
-    return True

@@ -9,7 +9,7 @@ import numpy as np
 
 from cell.core.documents.calibration_session import Precondition
 from cell.core.errors import DocumentError, UnmeasurableError
-from cell.core.geometry import Plane
+from cell.core.geometry import Array
 from cell.core.optics import CameraModel, SensorModel
 from cell.metrology.calibrate.board_pose import locate_boards
 from cell.metrology.calibrate.camera import CameraResult, solve_camera
@@ -27,6 +27,7 @@ from cell.programs.calibration.recorded import read_gates
 from cell.programs.calibration.seen import SeenView, see_again
 from cell.programs.calibration.session import Session
 from cell.programs.calibration.sphere import check_sphere, see_sphere
+from cell.programs.calibration.stillness import mean_plane, measure_misses
 
 STEPS = ("camera", "light plane", "laser path", "sphere", "last set")  # hand-eye says its own
 
@@ -162,23 +163,13 @@ def laser_path_rms(solution: Solution, belief: Belief) -> float:
         return float("nan")
     plane = solution.light_plane.plane if solution.light_plane else belief.sensor.light_plane
     chain, views = chain_of(solution, belief), solution.views
-    board = _board_in_base([view for view in views if view.record.number in answer.used],
-                           solution.camera, chain)
+    board = mean_plane([view for view in views if view.record.number in answer.used],
+                       solution.camera, chain)
     heights = [
         board.distance(chain.base_from_camera(view.record.pose, view.record.joints)
                        @ plane.meet(solution.camera.rays(view.stripe)))
         for view in views if view.record.number in answer.apart and view.stripe is not None]
     return float(np.sqrt(np.mean(np.concatenate(heights) ** 2))) if heights else float("nan")
-
-
-def _board_in_base(views: Sequence[SeenView], camera: CameraModel, chain: Chain) -> Plane:
-    """Lay the board's plane through where the views have its corners, on average."""
-    three = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0], [0.0, 100.0, 0.0]])
-    boards = locate_boards([view.board for view in views], camera)
-    origin, along, down = np.mean(
-        [chain.base_from_camera(view.record.pose, view.record.joints) @ board.camera_from_board
-         @ three for view, board in zip(views, boards, strict=True)], axis=0)
-    return Plane.through(origin, np.cross(along - origin, down - origin))
 
 
 def chain_of(solution: Solution, belief: Belief) -> Chain:
@@ -191,16 +182,11 @@ def chain_of(solution: Solution, belief: Belief) -> Chain:
     return Chain(answer.held_out.result.carrier_from_camera)
 
 
-def board_shift(before: SeenView, again: SeenView, belief: Belief) -> float:
-    """Say how far (mm) the board has moved between two views from one place.
-
-    The board pose of the first, seen from where the arm stands now, is held against the corners:
-    what a picture tells across the line of sight is some ten times better than along it.
+def before_and_after(solution: Solution, belief: Belief) -> tuple[Array, Array] | None:
+    """Measure how far (n,) mm each view misses the mean board, by the set before and by what was
+    solved now; None without a hand-eye.
     """
-    first, camera = locate_boards([before.board], belief.sensor.camera)[0], belief.sensor.camera
-    base_from_camera = again.record.pose @ belief.flange_from_camera
-    camera_from_board = (base_from_camera.inverse @ before.record.pose @ belief.flange_from_camera
-                         @ first.camera_from_board)
-    misses = camera.project(camera_from_board @ again.board.points_in_board) - again.board.pixels
-    distance = float(camera_from_board.translation[2])
-    return float(np.linalg.norm(misses.mean(axis=0))) * distance / float(camera.matrix[0, 0])
+    if solution.hand_eye is None or not solution.views:
+        return None
+    return (measure_misses(solution.views, belief.sensor.camera, belief.chain),
+            measure_misses(solution.views, solution.camera, chain_of(solution, belief)))

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import time
 
+from cell.core.documents.base import as_rows, as_six
 from cell.core.documents.calibration_session import CalibrationPlan, PlacedBoard
 from cell.core.documents.targets import BoardDocument
 from cell.core.errors import DocumentError
 from cell.core.ports import Operator
 from cell.programs.calibration.belief import Belief, design_of
-from cell.programs.calibration.capture import as_rows, as_six, shoot_ring
+from cell.programs.calibration.capture import shoot_ring
 from cell.programs.calibration.shown import Shown
 from cell.programs.calibration.start_look import StartLook, look_at_board
 from cell.programs.station import Station
