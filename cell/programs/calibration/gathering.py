@@ -40,7 +40,14 @@ class Gathering:
     def __post_init__(self) -> None:
         self.progress = Progress(self.session.header, self.belief)
         self._targets = self.session.header.numbered
-        self._place, self._done = 0, False
+        self._place, self._done = self._opened_at(), False
+
+    def _opened_at(self) -> int:
+        """Name the board that the arm was left at: that of the old view that was looked at again,
+        or the last one whose start view was found.
+        """
+        views = self.session.board_views
+        return views[-1].place if views else len(self.session.header.boards) - 1
 
     def gather(self) -> None:
         """Capture all planned views that are not on the disk yet.
@@ -69,11 +76,9 @@ class Gathering:
 
     def _take_up(self) -> None:
         """See again what is on the disk."""
-        views = self.session.views
-        for view in views:
-            if view.status == "ok" and view.purpose != "sphere":
-                self.progress.know(see_again(view, self.session, self.belief))
-        self.shown.plan(self.session.header, views)
+        for view in self.session.board_views:
+            self.progress.know(see_again(view, self.session, self.belief))
+        self.shown.plan(self.session.header, self.session.views)
 
     def _is_spared(self, number: int) -> bool:
         """Tell whether a view to be fitted to is not needed any more: the goal is reached."""

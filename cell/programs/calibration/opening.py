@@ -96,8 +96,7 @@ class Opening:
                                 f"is {self.belief.set_id} now: begin again",
                                 source=str(session.folder))
         check_identity(header.robot, self.station.identity, str(session.folder))
-        used = [view for view in session.views
-                if view.status == "ok" and view.purpose != "sphere"]
+        used = session.board_views
         self.operator.tell(f"going on with {session.folder.name}: {len(used)} views are there")
         self._agree_to_go_on(session, used)
         if used:

@@ -58,6 +58,12 @@ class Session:
         latest = {view.number: view for view in self._lines()}
         return tuple(latest[number] for number in sorted(latest))
 
+    @property
+    def board_views(self) -> tuple[ViewRecord, ...]:
+        """The views of boards that can be used."""
+        return tuple(view for view in self.views
+                     if view.status == "ok" and view.purpose != "sphere")
+
     def takes(self, number: int) -> int:
         """Count how often a view has been taken."""
         return sum(view.number == number for view in self._lines())

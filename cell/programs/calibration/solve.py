@@ -87,8 +87,7 @@ def solve_session(session: Session, belief: Belief) -> Solution:
 
 def see_views(session: Session, belief: Belief) -> tuple[SeenView, ...]:
     """Detect board and stripe in every usable view of a session."""
-    return tuple(see_again(view, session, belief) for view in session.views
-                 if view.status == "ok" and view.purpose != "sphere")
+    return tuple(see_again(view, session, belief) for view in session.board_views)
 
 
 def _solve(seen: tuple[SeenView, ...], session: Session, belief: Belief,
