@@ -69,8 +69,8 @@ class Chip:
         return np.clip(np.rint(read), 0, WHITE).astype(np.uint8)
 
 
-def speckled(rng, light, grain, looks):
-    """Multiply laser light (h, w) by speckle: the mean of `looks` patterns of a grain in px.
+def speckled(rng, light, speckle):
+    """Multiply laser light (h, w) by speckle: the mean of so many patterns of a grain in px.
 
     The grain is the deviation of the pupil's Gaussian amplitude; a pixel averages over its area.
     """
@@ -80,9 +80,9 @@ def speckled(rng, light, grain, looks):
     window = slice(columns[0], columns[-1] + 1)
     shape = (2 * light.shape[0], 2 * (columns[-1] + 1 - columns[0]))
     total = np.zeros(shape)
-    for _ in range(2 * looks):
-        total += cv2.GaussianBlur(rng.standard_normal(shape), (0, 0), 2.0 * grain) ** 2
+    for _ in range(2 * speckle.looks):
+        total += cv2.GaussianBlur(rng.standard_normal(shape), (0, 0), 2.0 * speckle.grain) ** 2
     pattern = total.reshape(shape[0] // 2, 2, shape[1] // 2, 2).mean(axis=(1, 3))
-    speckle = light.copy()
-    speckle[:, window] *= pattern / pattern.mean()
-    return speckle
+    rough = light.copy()
+    rough[:, window] *= pattern / pattern.mean()
+    return rough

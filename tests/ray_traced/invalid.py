@@ -5,12 +5,15 @@ from dataclasses import replace
 import numpy as np
 
 from ray_traced.plate import Sheet
+from ray_traced.scene import Label, SkinPlan
 from ray_traced.scenes import (
-    SkinPlan,
+    LIKELY_BEHIND,
+    MARKS,
     draw_behind,
     draw_plate,
-    finish_scene,
+    light_scene,
     place,
+    relabel,
     stripe_in_plate,
 )
 from ray_traced.sensor import SENSORS
@@ -18,115 +21,140 @@ from ray_traced.shapes import Beyond, Block, Both, Disc, Join
 from ray_traced.surface import FINISHES
 
 LEVEL = (0.5, 5.0)  # degrees
+BEHIND = 0.25       # of the pairs show a second sheet
 
 
 def draw_invalid(seed):
     """Draw a scene that must be refused; the kinds take turns."""
-    kind = KINDS[seed % len(KINDS)]
-    return replace(kind(np.random.default_rng([seed, 4]), seed), difficulty="invalid")
+    return KINDS[seed % len(KINDS)](np.random.default_rng([seed, 4]), seed)
 
 
-def base(rng, seed, reason, *, radii=(3.0, 8.0), reach=0.65, least=0.0, box=(5.0, 5.0, 5.0),
-         openings=None, behind=None, cover=None):
-    """Draw a plate with a hole (or other openings, from its radius) and refuse it for a reason."""
-    sensor = SENSORS[rng.integers(len(SENSORS))]
-    radius = rng.uniform(*radii)
-    turn, centre = place(rng, sensor, radius, LEVEL, reach, least, box)
-    marks = tuple(str(tag) for tag in rng.choice(["scratches", "dirt", "ambient", "none"], 1))
-    sheet = draw_plate(rng, str(rng.choice(list(FINISHES))), radius, marks,
-                       stripe_in_plate(sensor, turn, centre))
-    stack = sheet if openings is None else replace(sheet, openings=openings(radius))
-    sheets = [stack]
-    if behind if behind is not None else rng.random() < 0.25:
-        sheets.append(draw_behind(rng, sheet))
-    if cover is not None:
-        sheets.insert(0, cover(sheet, radius))
-    tags = tuple(tag for tag in marks if tag != "none")
-    scene = finish_scene(rng, seed, sensor, turn, centre, sheet, tags, "invalid",
-                         sheets=tuple(sheets), plate=sheets.index(stack))
-    return replace(scene, reason=reason, tags=(*tags, reason))
+def draw_refused(rng, seed, reason, change=None, *, radii=(3.0, 8.0), crossed=(0.0, 0.65)):
+    """Draw a plate with a hole; `change` takes the sheets and the stripe and gives other sheets."""
+    sensor, radius = SENSORS[rng.integers(len(SENSORS))], rng.uniform(*radii)
+    turn, centre = place(rng, sensor, radius, LEVEL, crossed[1], crossed[0])
+    stripe = stripe_in_plate(sensor, turn, centre)
+    tags = tuple(str(tag) for tag in rng.choice([*MARKS, "ambient", "none"], 1) if tag != "none")
+    material = str(rng.choice(list(FINISHES)))
+    sheet = draw_plate(rng, material, radius, tags, stripe)
+    sheets = (sheet, draw_behind(rng, sheet, material)) if rng.random() < BEHIND else (sheet,)
+    plate, sheets = change(sheets, stripe) if change else (0, sheets)
+    return light_scene(rng, seed, (sensor, turn, centre, radius), sheets,
+                       Label("invalid", tags, material, reason=reason), plate)
+
+
+def tagged(scene, *tags):
+    """Add tags to a scene."""
+    return relabel(scene, tags=(*scene.label.tags, *tags))
+
+
+def opened(shape):
+    """Give a change that replaces the hole by the openings `shape(radius, stripe)`."""
+    def change(sheets, stripe):
+        radius = sheets[0].openings[0].radius
+        return 0, (replace(sheets[0], openings=shape(radius, stripe)), *sheets[1:])
+    return change
 
 
 def no_hole(rng, seed):
-    return base(rng, seed, "no_hole", openings=lambda radius: (), behind=False)
+    return draw_refused(rng, seed, "no_hole", lambda sheets, _: (0, (replace(
+        sheets[0], openings=()),)))
 
 
 def no_laser(rng, seed):
-    return replace(base(rng, seed, "no_laser"), fan=None)
+    return replace(draw_refused(rng, seed, "no_laser"), fan=None)
 
 
 def laser_misses_hole(rng, seed):
-    return base(rng, seed, "laser_misses_hole", radii=(2.5, 5.0), least=1.2, reach=2.0)
+    return draw_refused(rng, seed, "laser_misses_hole", radii=(2.5, 5.0), crossed=(1.2, 2.0))
 
 
 def slot(rng, seed):
-    length, turn = rng.uniform(1.25, 2.5), rng.uniform(0.0, np.pi)
-    return base(rng, seed, "slot", radii=(2.5, 4.5), openings=lambda radius: (
-        Block(0.0, 0.0, radius * length, radius, radius, turn),))
+    longer, turn = rng.uniform(1.25, 2.5), rng.uniform(0.0, np.pi)
+    return draw_refused(rng, seed, "slot", opened(lambda radius, _: (
+        Block(0.0, 0.0, radius * longer, radius, radius, turn),)), radii=(2.5, 4.5))
 
 
 def square(rng, seed):
     corner, turn = rng.uniform(0.02, 0.3), rng.uniform(0.0, np.pi)
-    scene = base(rng, seed, "not_round", openings=lambda radius: (
-        Block(0.0, 0.0, radius, radius, radius * corner, turn),))
-    return replace(scene, tags=(*scene.tags, "square"))
+    return tagged(draw_refused(rng, seed, "not_round", opened(lambda radius, _: (
+        Block(0.0, 0.0, radius, radius, radius * corner, turn),))), "square")
+
+
+def cut_across(rng, radius, stripe):
+    """Draw a straight line that leaves half of the hole or a little more, and the stripe in it."""
+    while True:
+        rest = Beyond(rng.uniform(0.0, 2.0 * np.pi), rng.uniform(-0.4, 0.1) * radius)
+        if rest.distance(-stripe[2] * stripe[:2]) < -0.3 * radius:
+            return rest
 
 
 def d_shaped(rng, seed):
-    turn, part = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(-0.3, 0.5)
-    scene = base(rng, seed, "half_occluded", openings=lambda radius: (
-        Both((Disc(0.0, 0.0, radius), Beyond(turn, -part * radius))),))
-    return replace(scene, tags=(*scene.tags, "d_shaped"))
+    return tagged(draw_refused(rng, seed, "half_occluded", opened(lambda radius, stripe: (
+        Both((Disc(0.0, 0.0, radius), cut_across(rng, radius, stripe))),))), "d_shaped")
 
 
 def covered(rng, seed, *, behind=False):
     """Lay a straight-edged sheet over a part of the hole, a little above it."""
-    turn, part = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(-0.4, 0.4)
-    height, finish = rng.uniform(0.5, 4.0), str(rng.choice(list(FINISHES)))
-    return base(rng, seed, "half_occluded", behind=behind, cover=lambda sheet, radius: Sheet(
-        -height - 0.8, 0.8, (Beyond(turn, -part * radius),), SkinPlan(finish)))
+    height = rng.uniform(0.5, 4.0)
+
+    def change(sheets, stripe):
+        material = next(name for name in FINISHES if FINISHES[name] is sheets[0].skin.finish)
+        rest = cut_across(rng, sheets[0].openings[0].radius, stripe)
+        cover = Sheet(-height - 0.8, 0.8, (rest,),
+                      SkinPlan(FINISHES[str(rng.choice(LIKELY_BEHIND[material]))]))
+        under = (sheets[0], draw_behind(rng, sheets[0], material)) if behind else sheets[:1]
+        return 1, (cover, *under)
+
+    return tagged(draw_refused(rng, seed, "half_occluded", change), "cover")
 
 
 def covered_and_lit(rng, seed):
-    scene = covered(rng, seed, behind=True)
-    return replace(scene, tags=(*scene.tags, "back"))
+    return tagged(covered(rng, seed, behind=True), "back")
 
 
 def cut_by_border(rng, seed):
-    scene = base(rng, seed, "hole_cut_by_border", radii=(4.0, 9.0))
-    height, fy = scene.sensor.size[1], scene.sensor.focal[1]
-    side = rng.choice([0.0, height - 1.0])
-    y = (side - scene.sensor.centre[1]) / fy * scene.centre[2]
-    centre = scene.centre.copy()
-    centre[1] = y + rng.uniform(-0.7, 0.7) * scene.radius
-    return replace(scene, centre=np.round(centre, 4))
+    scene = draw_refused(rng, seed, "hole_cut_by_border", radii=(4.0, 9.0))
+    side = rng.choice([0.0, scene.sensor.size[1] - 1.0])
+    y = (side - scene.sensor.centre[1]) / scene.sensor.focal[1] * scene.centre[2]
+    centre = scene.centre * [1.0, 0.0, 1.0] + [0.0, y + rng.uniform(-0.7, 0.7) * scene.radius, 0.0]
+    return replace(scene, centre=centre.round(4))
+
+
+def exposed(scene, **changes):
+    """Give the scene with another exposure."""
+    return replace(scene, exposure=replace(scene.exposure, **changes))
 
 
 def too_dark(rng, seed):
-    return replace(base(rng, seed, "too_dark"), grey=rng.uniform(1.0, 4.0))
+    return exposed(draw_refused(rng, seed, "too_dark"), face=rng.uniform(1.0, 4.0))
 
 
 def saturated(rng, seed):
-    return replace(base(rng, seed, "saturated"), clipped=rng.uniform(0.995, 0.9999))
+    return exposed(draw_refused(rng, seed, "saturated"), clipped=rng.uniform(0.995, 0.9999))
 
 
 def blurred(rng, seed):
-    scene = base(rng, seed, "blurred")
+    scene = draw_refused(rng, seed, "blurred")
     return replace(scene, lens=replace(scene.lens, blur=rng.uniform(5.0, 9.0)))
 
 
 def images_swapped(rng, seed):
-    return replace(base(rng, seed, "images_swapped"), swapped=True)
+    return replace(draw_refused(rng, seed, "images_swapped"), swapped=True)
 
 
 def stepped(rng, seed):
-    """Let one half of the sheet stand higher: a hole through two sheets that meet in it."""
+    """Let one half of the sheet stand higher: a hole where two sheets of a joint meet."""
     height = rng.uniform(0.4, 1.5)
     turn = rng.choice([0.5, 1.5]) * np.pi + rng.normal(0.0, 0.2)
-    return base(rng, seed, "stripe_segments_disagree", radii=(3.5, 8.0), reach=0.4,
-                cover=lambda sheet, radius: replace(
-                    sheet, front=-height, thickness=height,
-                    openings=(Join((Disc(0.0, 0.0, radius), Beyond(turn, 0.0))),)))
+
+    def change(sheets, _):
+        hole = sheets[0].openings[0]
+        return 1, (replace(sheets[0], front=-height, thickness=height,
+                           openings=(Join((hole, Beyond(turn, 0.0))),)), *sheets)
+
+    return tagged(draw_refused(rng, seed, "stripe_segments_disagree", change,
+                               radii=(3.5, 8.0), crossed=(0.0, 0.4)), "step")
 
 
 KINDS = (no_hole, no_laser, laser_misses_hole, slot, square, d_shaped, covered, covered_and_lit,

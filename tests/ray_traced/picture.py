@@ -9,8 +9,7 @@ from ray_traced.plate import VOID, Rays
 from ray_traced.shading import Shading
 
 SIDE = 2        # rays a pixel: SIDE x SIDE, and where two surfaces meet
-FINER = 48      # as many as this
-GOLDEN = 1.32471795724474602596  # the plastic number: its powers spread points evenly
+FINER, STRIDE = 144, 89  # as many as this: neighbours in Fibonacci's row make an even lattice
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,17 +62,21 @@ def look(scene):
     light = light.reshape(height, SIDE, width, SIDE, 3).mean(axis=(1, 3))
     labels = (hits[0] * 8 + hits[1]).reshape(height, SIDE, width, SIDE)
     y, x = np.nonzero(_borders(labels))
-    slopes = scene.sensor.slopes(np.stack([x, y], axis=-1)[:, None] + _spread()).reshape(-1, 2)
+    parts = _spread(np.random.default_rng([scene.seed, 6]), len(y))
+    slopes = scene.sensor.slopes(np.stack([x, y], axis=-1)[:, None] + parts).reshape(-1, 2)
     rays = rays_in_plate(scene, slopes)
     finer = shading.radiance(rays, trace(scene.sheets, rays))
     light[y, x] = finer.reshape(len(y), FINER, 3).mean(axis=1)
     return Light(*np.moveaxis(light, -1, 0), labels[:, 0, :, 0])
 
 
-def _spread():
-    """Spread FINER points evenly over a pixel (the R2 sequence), their mean in its centre."""
-    points = np.arange(1, FINER + 1)[:, None] / GOLDEN ** np.array([1.0, 2.0]) % 1.0
-    return points - points.mean(axis=0)
+def _spread(rng, count):
+    """Spread FINER points evenly over each of `count` pixels (count, FINER, 2).
+
+    Each pixel shifts the lattice by chance, or an edge along its rows would be off in many.
+    """
+    lattice = np.arange(FINER)[:, None] * [1, STRIDE] / FINER
+    return (lattice + rng.uniform(size=(count, 1, 2))) % 1.0 - 0.5
 
 
 def _borders(labels):

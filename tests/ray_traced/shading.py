@@ -5,7 +5,7 @@ import numpy as np
 from ray_traced.light import send_back, sky_share
 from ray_traced.marks import mark
 from ray_traced.plate import FACE, VOID, WALL, open_way
-from ray_traced.surface import FINISHES, look_up, make_skin
+from ray_traced.surface import TEXEL, look_up, make_skin
 
 COARSE, FINE = 1.0, 0.15  # mm: the grid of light on a face, free and behind another sheet
 BEAM = 6.0                # standard deviations of the laser that are looked at
@@ -29,7 +29,7 @@ class Shading:
         sheet = self.scene.sheets[number]
         p = rays[mine].at(sheet.front)
         rng = np.random.default_rng([self.scene.seed, number])
-        skin = make_skin(rng, FINISHES[sheet.skin.finish], p.min(axis=0) - 0.2,
+        skin = make_skin(rng, sheet.skin.finish, p.min(axis=0) - 0.2,
                          p.max(axis=0) + 0.2)
         mark(rng, skin, sheet.skin.marks)
         return Face(self, number, skin)
@@ -74,7 +74,7 @@ class Face:
 
     @property
     def shape(self):
-        high, wide = np.array(self.skin.matt.shape) * 0.035 / self.step
+        high, wide = np.array(self.skin.matt.shape) * TEXEL / self.step
         return int(high) + 3, int(wide) + 3
 
     def _grid(self):

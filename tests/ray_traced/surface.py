@@ -32,10 +32,10 @@ class Finish:
 
 
 FINISHES = {
-    "bare_steel": Finish(0.12, 0.20, 0.16, 0.32, cloud=0.06, fine=0.05, streak=0.13),
-    "galvanised": Finish(0.24, 0.24, 0.25, 0.25, cloud=0.03, fine=0.04, facets=0.085),
+    "bare_steel": Finish(0.12, 0.20, 0.16, 0.32, cloud=0.06, fine=0.08, streak=0.12),
+    "galvanised": Finish(0.24, 0.24, 0.25, 0.25, cloud=0.03, fine=0.05, facets=0.12),
     "ecoat_grey": Finish(0.30, 0.04, 0.22, 0.22, cloud=0.06, mottle=0.05, fine=0.015, wall=1.0),
-    "ecoat_black": Finish(0.045, 0.035, 0.20, 0.20, cloud=0.08, mottle=0.05, fine=0.015, wall=1.0),
+    "ecoat_black": Finish(0.045, 0.035, 0.28, 0.28, cloud=0.06, mottle=0.05, fine=0.015, wall=1.0),
     "white_primer": Finish(0.68, 0.02, 0.30, 0.30, cloud=0.03, fine=0.02, wall=1.0),
 }
 
@@ -145,7 +145,7 @@ def spangles(rng, shape, low):
 def facet_lines(rng, labels, count, low):
     """Give the fine lines (h, w) of the crystals: each has its own direction and pitch."""
     turn, pitch = rng.uniform(0, np.pi, count), rng.uniform(0.2, 0.5, count)
-    strength = rng.choice([0.0, 0.06, 0.12], count)
+    strength = rng.choice([0.0, 0.08, 0.16], count)
     y, x = np.mgrid[:labels.shape[0], :labels.shape[1]].astype(np.float32) * np.float32(TEXEL)
     wave = 2.0 * np.pi / pitch
     phase = (np.cos(turn) * wave)[labels] * x + (np.sin(turn) * wave)[labels] * y
