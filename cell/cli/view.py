@@ -26,8 +26,8 @@ def view(
     """Open a recording in the viewer: images with what was found, the body, deviations, verdicts.
 
     Works offline. The viewer listens on 127.0.0.1 only and sends no usage data; the page of
-    `--web` is served from this machine, but a browser with access to the internet lets it ask for
-    news: open it in one without, or block them there.
+    `--web` is served from this machine, and with a policy under which browsers let it talk to
+    this machine alone.
 
     What is shown is drawn anew from the audited records. A torn recording is shown up to its last
     whole hole; what is not as it was sealed is said. Ctrl-C ends it.

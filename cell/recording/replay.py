@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,6 +29,7 @@ from cell.recording.viewer import (
     viewer_process,
     web_url,
 )
+from cell.recording.web_page import guarded_page
 
 PATIENCE_S = 60.0
 SETTLE_S = 6.0  # until a software renderer has drawn, and the viewer has said what it says first
@@ -175,10 +177,10 @@ def serve(log: Path, open_at: int | None, tell: Callable[[str], None]) -> None:
         DeviceError: the server does not start.
     """
     port, web_port = free_port(), free_port()
-    with viewer_process("--serve-web", "--port", str(port),
-                        "--web-viewer-port", str(web_port)) as process:
+    with (viewer_process("--serve-web", "--port", str(port), "--web-viewer-port", str(web_port)
+                         ) as process, guarded_page(web_port) as page):
         replay(log, hub_url(port), open_at)
-        tell(web_url(web_port, port))
+        tell(web_url(page, port))
         process.wait()
 
 
@@ -188,13 +190,15 @@ def wait_for_run(tell: Callable[[str], None] | None) -> None:
     Raises:
         DeviceError: there is no screen, or the port is taken.
     """
+    web: tuple[str, ...] = ()
     web_port = free_port()
-    web = ("--serve-web", "--web-viewer-port", str(web_port)) if tell is not None else ()
     if tell is None:
         _check_display()
-    with viewer_process("--port", str(LIVE_PORT), *web) as process:
+    else:
+        web = ("--serve-web", "--web-viewer-port", str(web_port))
+    with viewer_process("--port", str(LIVE_PORT), *web) as process, ExitStack() as closing:
         if tell is not None:
-            tell(web_url(web_port, LIVE_PORT))
+            tell(web_url(closing.enter_context(guarded_page(web_port)), LIVE_PORT))
         if process.wait():
             raise DeviceError(f"ended at once: is the port {LIVE_PORT} of another viewer?",
                               device="viewer")
