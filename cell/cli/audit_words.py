@@ -9,10 +9,11 @@ from math import inf, isfinite
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rich.box import SIMPLE
+from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from cell.cli.words import Answers, answers, console
+from cell.cli.words import answers, console
 
 if TYPE_CHECKING:
     from cell.programs.audit.compare import Difference
@@ -31,14 +32,14 @@ MOST = 24  # rows of a table; all are in the JSON
 def print_audit(audit: LogAudit) -> None:
     """Print what came of one recording."""
     answers.print(f"[bold]{escape(audit.log.name)}[/]  [{COLOURS[audit.answer]}]{audit.answer}[/]"
-                  f"  {_origin(audit)}", highlight=False)
+                  f"  {_origin(audit)}", highlight=False, soft_wrap=True)
     if audit.problem is not None:
-        answers.print(f"  [red]{escape(audit.problem)}[/]", highlight=False)
+        answers.print(f"  [red]{escape(audit.problem)}[/]", highlight=False, soft_wrap=True)
     for check in audit.checks:
         answers.print(f"  {MARKS[check.passed]} {check.level:<10} {escape(check.words)}",
-                      highlight=False)
+                      highlight=False, soft_wrap=True)
     for line in _lines(audit):
-        answers.print(f"  {line}", highlight=False)
+        answers.print(f"  {line}", highlight=False, soft_wrap=True)
     if audit.differences:
         _print_table(_differences(audit))
     if audit.changes:
@@ -67,7 +68,7 @@ def print_change(audit: LogAudit) -> None:
 
 def _print_table(table: Table) -> None:
     """Give a table the room that it needs where no screen sets a width."""
-    (answers if answers.is_terminal else Answers(width=WIDE)).print(table)
+    (answers if answers.is_terminal else Console(width=WIDE)).print(table)
 
 
 def print_row(audits: Sequence[LogAudit], folders: Sequence[FolderAudit]) -> None:
@@ -79,7 +80,7 @@ def print_row(audits: Sequence[LogAudit], folders: Sequence[FolderAudit]) -> Non
     for folder in folders:
         for finding in folder.findings:
             answers.print(f"[red]{finding.kind}[/] {escape(finding.file)}: "
-                          f"{escape(finding.words)}", highlight=False)
+                          f"{escape(finding.words)}", highlight=False, soft_wrap=True)
         if folder.head:
             answers.print(f"newest head {folder.head} ({folder.newest})\n"
                           "keep it elsewhere: it shows when the newest bodies are removed",

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import os
 import signal
 import sys
 import time
@@ -30,6 +28,7 @@ from cell.cli.run import run
 from cell.cli.seal_key import seal_key_app
 from cell.cli.shift import shift
 from cell.cli.sim import sim
+from cell.cli.streams import check_words, open_streams
 from cell.cli.study import study_app
 from cell.cli.view import view
 from cell.cli.words import console, print_json
@@ -70,7 +69,7 @@ def main() -> None:
         signal.signal(number, interrupt)
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as under nohup
         signal.signal(signal.SIGHUP, interrupt)
-    _open_streams()
+    open_streams()
     sys.exit(_run())
 
 
@@ -86,26 +85,11 @@ class _Interrupt:
             raise KeyboardInterrupt
 
 
-def _open_streams() -> None:
-    """Have all three streams open, so that no file is opened in the place of a closed one, and
-    writing what a narrow encoding lacks as `?`.
-    """
-    for number, name in enumerate(("stdin", "stdout", "stderr")):
-        if getattr(sys, name) is None:
-            os.open(os.devnull, os.O_RDWR)  # takes the lowest free number: this one
-            setattr(sys, name, open(number, "w" if number else "r", closefd=False))  # noqa: SIM115
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")
-
-
 def _run() -> int:
     command = typer.main.get_command(app)
     try:  # not app(): that turns an interrupt into a code without an answer, a broken pipe into 1
-        with command.make_context("cell", sys.argv[1:]) as context:
-            command.invoke(context)
-    except typer.Exit as leave:
-        return leave.exit_code
+        check_words(sys.argv[1:])
+        return _invoke(command)
     except (KeyboardInterrupt, EOFError, typer.Abort):
         console.print("interrupted", style="yellow")
         return _fail(INTERRUPTED, "interrupted")
@@ -118,7 +102,17 @@ def _run() -> int:
         traceback.print_exc()
         console.print("This is a fault of the program, not of your input.", style="red")
         return _fail(BUG, repr(bug))
-    return 0
+
+
+def _invoke(command: Any) -> int:  # noqa: ANN401  wherever click lives
+    code = 0
+    try:
+        with command.make_context("cell", sys.argv[1:]) as context:
+            command.invoke(context)
+    except typer.Exit as leave:
+        code = leave.exit_code
+    sys.stdout.flush()  # here, where what cannot be written has an exit code
+    return code
 
 
 def _explain(error: CellError) -> str:

@@ -75,6 +75,31 @@ def test_an_answer_that_nobody_reads_is_no_fault(tmp_path, redirection, code):
     assert ("cannot be written to standard output" in done.stderr) == (code == 4)
 
 
+@pytest.mark.parametrize(("words", "redirection", "code"), [
+    ("compare a.csv nowhere.csv", "2> >(true)", 2),
+    ("compare a.csv nowhere.csv", "2> /dev/full", 2),
+    ("--help", "| true", 0), ("compare --help", "| true", 0), ("results", "2>&1 | true", 2),
+    ("--help", "> /dev/full", 4), ("--version", "> /dev/full", 4), ("--version", "| true", 0)])
+def test_no_reader_of_words_or_help_changes_the_exit_code(tmp_path, words, redirection, code):
+    (tmp_path / "a.csv").write_text("id,x,y,z\nA,1,2,3\n")
+    line = f"set -o pipefail; {sys.executable} -m cell {words} {redirection}"
+    done = subprocess.run(["bash", "-c", line], cwd=tmp_path, capture_output=True, text=True,
+                          stdin=subprocess.DEVNULL, timeout=60, check=False)
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
+def test_words_that_are_no_text_are_refused(cell_folder, encoding):
+    """Bytes of another encoding could neither be recorded nor found again."""
+    own = {"LC_ALL": "C", "PYTHONUTF8": str(int(encoding == "utf-8")), "PYTHONCOERCECLOCALE": "0"}
+    done = subprocess.run([sys.executable, "-m", "cell", "run", "jobs/demo.yaml", "--json",
+                           "--body", "Größe".encode("latin-1")], cwd=cell_folder,
+                          capture_output=True, timeout=60, check=False, env=os.environ | own)
+    assert done.returncode == 2
+    assert f"encoding of this locale, {encoding}" in json.loads(done.stdout)["detail"]
+
+
 def test_a_narrow_encoding_and_terminal_cost_no_number(tmp_path):
     (tmp_path / "a.csv").write_text("id,x,y,z\nA,1,2,3\n")
     narrow = {**os.environ, "PYTHONIOENCODING": "ascii", "COLUMNS": "20", "TERM": "dumb"}
