@@ -26,7 +26,7 @@ DARKEST, BRIGHTEST = -0.6, 1.3        # k
 NOTABLE_WALL = 1.5                    # px
 NARROWEST, WIDEST, USUAL_BLUR = 0.4, 6.0, 1.2  # px
 SECTORS = 12          # of a rim
-PIXELS_PER_ERROR = 30.0  # texture and smoothing: so many pixels go wrong together
+PIXELS_PER_ERROR = 60.0  # texture and smoothing: so many pixels go wrong together
 
 
 class RimModel:
@@ -89,17 +89,15 @@ def fit_profile(band: Band, rays: Mask, walls: list[Wall], *, doubled: bool = Tr
             if misfit < wall.worth * least:
                 best, least, chosen = state, misfit, wall
     thinned = band[used[::THINNED]]
-    # One step: run on, a wall that nobody could predict goes on widening where it explains noise.
-    best, _ = _descend(RimModel(thinned, chosen), thinned, best, steps=1)
+    best, _ = _descend(RimModel(thinned, chosen), thinned, best)
     return RimModel(band, chosen).read(best)
 
 
-def _descend(model: RimModel, band: Band, state: Array,
-             steps: int = STEPS) -> tuple[Array, float]:
+def _descend(model: RimModel, band: Band, state: Array) -> tuple[Array, float]:
     """Fit from a start (Gauss-Newton): the numbers, and the mean misfit of a ray in grey."""
     rows = model.rows()
     flat, misfit = rows.reshape(-1, len(state)), np.inf
-    for _ in range(steps):
+    for _ in range(STEPS):
         seen = compare(band.grey, shape_step(band.offsets, model.read(state)))
         misfit, scale = float(seen.misfit.mean()), max(middle(seen.misfit), 1e-3)
         weight = tukey_weights(np.maximum(seen.misfit - scale, 0.0), scale)
