@@ -46,6 +46,7 @@ class Scene:
     surface: str = "plain"           # brushed, spangled
     gradient: float = 0.0            # of the light across the picture, as a share
     burr: float = 0.0                # mm, outward, on a third of the rim
+    waves: dict = field(default_factory=dict)  # mm of the rim's form, by crests
     dark_arc: float = 0.0            # degrees of the rim in shadow
     glints: int = 0
     scratches: int = 0
@@ -79,7 +80,9 @@ class Scene:
         n = self.normal
         u = np.cross(n, [0.0, 1.0, 0.0])
         u /= np.linalg.norm(u)
-        flat = _outline(self.shape, self.radius + grow, count)
+        turn = np.linspace(0.0, 2 * np.pi, count, endpoint=False)[:, None]
+        form = sum(height * np.cos(crests * turn + 0.4) for crests, height in self.waves.items())
+        flat = _outline(self.shape, self.radius + grow + form, count)
         face = np.array(self.centre) - n * depth
         return self.sensor.camera.project(face + flat @ np.stack([u, np.cross(n, u)]))
 

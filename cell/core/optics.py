@@ -19,11 +19,15 @@ NEWTON_STEPS = 6  # quadratic: four suffice for the lenses met, two are for the 
 
 @dataclass(frozen=True, eq=False)
 class CameraModel:
-    """A calibrated camera: image size (width, height), 3x3 matrix in px, distortion (5,)."""
+    """A calibrated camera: image size (width, height), 3x3 matrix in px, distortion (5,).
+
+    `blur` is how soft a sharp edge appears, the standard deviation in px; None where nobody knows.
+    """
 
     image_size: tuple[int, int]
     matrix: Array
     distortion: Array
+    blur: float | None = None
 
     def project(self, points_in_camera: ArrayLike) -> Array:
         """Project points (..., 3) in mm to pixels (..., 2), distortion included."""

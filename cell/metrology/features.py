@@ -64,5 +64,5 @@ class Stripe:
     side: Array
     sigma: float
     correlation: float
-    bias: float = 0.03
+    bias: float = 0.02
     quality: dict[str, float] = field(default_factory=dict)

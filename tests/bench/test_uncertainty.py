@@ -22,7 +22,7 @@ from cell.metrology.locate.uncertainty import CENTRE_DOUBT, RADIUS_DOUBT
 
 pytestmark = [pytest.mark.bench, pytest.mark.timeout(1200)]
 
-POINT_SCENES, RENDERED_SCENES = 500, 400
+POINT_SCENES, RENDERED_SCENES = 2000, 2000
 AXES = ("x", "y", "z", "radius")
 SAME = Transform.identity()
 SIGMA = 0.0061
@@ -41,6 +41,14 @@ def show(capsys, title, errors, sigmas):
     with capsys.disabled():
         Console(width=110).print(table)
     return ratios
+
+
+def assert_true(ratios):
+    """Every axis for itself keeps to what is asked."""
+    within_2u, median = np.mean(ratios < 2, axis=0), np.median(ratios, axis=0)
+    assert np.all((within_2u > 0.92) & (within_2u < 0.98))
+    assert np.all(np.mean(ratios < 3, axis=0) > 0.98)
+    assert np.all((median > 0.4) & (median < 0.9))
 
 
 def wrong_sensor(rng):
@@ -78,8 +86,7 @@ def test_point_scenes_with_calibration_and_edges_that_are_off(capsys):
         sigmas.append(np.sqrt(np.diag(found.covariance)))
     ratios = show(capsys, "Point data, calibration and edges off", np.array(errors),
                   np.array(sigmas))
-    assert np.all(np.mean(ratios < 2, axis=0) > 0.92)
-    assert np.all(np.mean(ratios < 3, axis=0) > 0.98)
+    assert_true(ratios)
 
 
 def test_rendered_scenes(capsys):
@@ -98,9 +105,7 @@ def test_rendered_scenes(capsys):
     ratios = show(capsys, f"Rendered pairs ({refused} refused)", np.array(errors),
                   np.array(sigmas))
     assert refused <= 0.02 * RENDERED_SCENES
-    assert np.mean(ratios < 2) > 0.92
-    assert np.mean(ratios < 3) > 0.98
-    assert np.all((np.median(ratios, axis=0) > 0.35) & (np.median(ratios, axis=0) < 0.9))
+    assert_true(ratios)
 
 
 def test_rendered_recentred(capsys):

@@ -21,11 +21,16 @@ SLANT = (float(np.sin(np.radians(1.0))), float(np.sin(np.radians(80.0))))  # of 
 
 
 class CameraDocument(Document):
-    """A camera alone: image size (width, height) and matrix in px, distortion as OpenCV has it."""
+    """A camera alone: image size (width, height) and matrix in px, distortion as OpenCV has it.
+
+    `blur` is optional: how soft a sharp edge appears, the standard deviation in px. With it, a rim
+    that is softer is known to be rounded or burred, and one that is not, to be sharp.
+    """
 
     image_size: tuple[Pixels, Pixels]
     camera_matrix: Matrix3
     distortion: tuple[Number, Number, Number, Number, Number]
+    blur: Annotated[Number, Field(gt=0.0, le=10.0)] | None = None
 
     @field_validator("camera_matrix")
     @classmethod
@@ -38,7 +43,8 @@ class CameraDocument(Document):
     @property
     def camera(self) -> CameraModel:
         """The camera as mathematics uses it."""
-        return CameraModel(self.image_size, np.array(self.camera_matrix), np.array(self.distortion))
+        return CameraModel(self.image_size, np.array(self.camera_matrix), np.array(self.distortion),
+                           self.blur)
 
 
 class SensorDocument(CameraDocument):

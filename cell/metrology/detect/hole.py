@@ -43,9 +43,11 @@ INWARD = 3.0           # px of hole beyond the wall
 MANY = 0.87            # profiles an edge, below which two rims may show
 NOTICED = 0.7          # px of wall, below which its brightness makes no difference
 ROUGH_SPACING, SPACING = 3.0, 1.5  # px along the rim
-SHARP = 1.0            # px of blur by the lens, above which the edge itself may be rounded
+SHARP = 1.0            # px of blur, above which an edge may be rounded where nobody knows the lens
+ALIKE = 1.08           # times the lens's blur: a sharp rim on any surface
 SOFT_DOUBT, SOFTEST = 6.0, 1.5  # px of ambiguity by each px beyond, and at most
-LIT_DOUBT, DARK_DOUBT = 0.4, 0.25  # of what a wall draws an edge by: a dark one is like another
+LIT_DOUBT, DARK_DOUBT = 0.4, 0.2  # of what a wall draws an edge by: a dark one is like another
+WAVES = np.arange(3, 5)  # crests round a rim: the form of punched and drilled holes
 SMALL_ROUGHNESS = 0.25  # px from end to end, which texture alone gives
 EVEN, LIP = 0.06, 1.7   # px² that the blur's variance differs by all the same; lips beyond that
 CLIPPED_DOUBT = 0.6     # px, where white hides how high the step is
@@ -95,7 +97,8 @@ def detect_rim(image: Image, hole: Hole, camera: CameraModel, expected: Expected
     check_unclipped(band.grey[good])
     rim = _rim(band, edge, good, profile, hole)
     doubt = 0.0 if known else doubt_of_wall(walls[0], profile)
-    return replace(rim, ambiguity=rim.ambiguity + doubt)
+    doubt += _ambiguity(band, edge, np.flatnonzero(good), profile, camera.blur)
+    return replace(rim, ambiguity=doubt)
 
 
 def _rough_rim(hole: Hole) -> tuple[Ellipse, Mask, bool]:
@@ -126,29 +129,41 @@ def _rim(band: Band, edge: Array, good: Mask, profile: Profile, hole: Hole) -> R
     ellipse, miss, scale = settle(band, Edges(ray, edge[ray], edge[ray]), floor=0.01)
     check_round(ellipse, scale)
     kept = np.abs(miss) < 3.5 * scale
+    noise = _without_waves(miss[kept], band.t[ray[kept]])
     normals = band.normals[ray]
     # A blurred disc looks smaller: its half level lies s**2 / 2R inside.
     bend = profile.blur**2 / (2.0 * ellipse.radius)
     points = band.ellipse.points(band.t[ray]) + (edge[ray] + bend)[:, None] * normals
     x, y = map(float, ellipse.centre)
     major, minor, angle = ellipse.axes
-    return Rim(points[kept], -normals[kept], robust_sigma(miss[kept]),
-               correlation_length(miss[kept]), (x, y, major + bend, minor + bend, angle),
-               ambiguity=_ambiguity(band, edge, ray, profile), drawn=_drawn(profile[ray[kept]]),
-               blur=profile.blur, quality=_quality(hole, profile, good))
+    return Rim(points[kept], -normals[kept], robust_sigma(noise), correlation_length(noise),
+               (x, y, major + bend, minor + bend, angle),
+               drawn=_drawn(profile[ray[kept]]), blur=profile.blur,
+               quality=_quality(hole, profile, good))
 
 
-def _ambiguity(band: Band, edge: Array, rays: Indices, profile: Profile) -> float:
+def _without_waves(miss: Array, t: Array) -> Array:
+    """Take the hole's own waves out of what edges miss an ellipse by, at the angles t (n,): waves
+    of more than two crests round a rim move neither its centre nor its size.
+    """
+    turns = np.outer(t, WAVES)
+    waves = np.concatenate([np.cos(turns), np.sin(turns)], axis=1)
+    return miss - waves @ np.linalg.lstsq(waves, miss, rcond=None)[0]
+
+
+def _ambiguity(band: Band, edge: Array, rays: Indices, profile: Profile,
+               lens: float | None) -> float:
     """Say how far the visible edge may lie beside the bore's (px): burr and die roll show as a
-    ragged edge, a soft one, or one that is softer here than there; what is white may be of any
-    height.
+    ragged edge, one that is softer than the `lens` (px) draws it, or softer here than there; what
+    is white may be of any height.
     """
     low, high = np.quantile((edge - profile.edge)[rays], [0.025, 0.975])
-    soft = np.sqrt(max(profile.blur**2 - SMOOTHING**2, 0.0)) - SHARP
+    softness = np.sqrt(max(profile.blur**2 - SMOOTHING**2, 0.0))
+    rounded = SOFT_DOUBT * (softness - (SHARP if lens is None else ALIKE * lens))
     uneven = uneven_blur(band[rays], replace(profile, edge=edge)[rays])
     ragged = max(high - low - SMALL_ROUGHNESS, LIP * np.sqrt(max(uneven - EVEN, 0.0)))
     white = CLIPPED_DOUBT * float(clipped(band.grey[rays]).mean())
-    return float(max(ragged, min(SOFT_DOUBT * soft, SOFTEST), 0.0) + white)
+    return float(max(ragged, min(rounded, SOFTEST), 0.0) + white)
 
 
 def _drawn(profile: Profile) -> Array:

@@ -43,6 +43,7 @@ MEASURABLE = {
     "bright behind": ({"plate": 40.0, "behind": 110.0, "wall": 30.0}, 0.15, 1.0),
     "second sheet": ({"behind": 60.0, "wall": 20.0, "stripe_behind": 8.0}, 0.1, 0.12),
     "lying stripe": ({"sensor": LYING}, 0.06, 0.06),
+    "blooming stripe": ({"stripe": 4000.0, "stripe_width": 4.5}, 0.05, 0.06),
     "strong tilt": ({"tilt": (9.0, -9.0)}, 0.08, 0.1),
 }
 
@@ -188,6 +189,24 @@ def test_an_edge_softer_on_one_side_is_ambiguous():
     plain, uneven = (detect_hole(seen, scene.sensor.camera, scene.expected())
                      for seen in (image, lipped))
     assert uneven.ambiguity > plain.ambiguity + 0.3
+
+
+def test_an_edge_is_ambiguous_where_it_is_softer_than_the_lens():
+    soft, camera = Scene(noise=2.0, blur=1.4), Scene().sensor.camera
+    image = soft.hole_image()
+    nobody_knows, soft_lens, sharp_lens = (
+        detect_hole(image, replace(camera, blur=blur), soft.expected()).ambiguity
+        for blur in (None, 1.5, 0.9))
+    assert soft_lens < 0.1 < 0.5 < min(nobody_knows, sharp_lens)
+
+
+@pytest.mark.parametrize("waves", [3, 4])
+def test_waves_that_go_round_the_rim_are_form_and_no_noise(waves):
+    plain, wavy = Scene(noise=2.0), Scene(noise=2.0, waves={waves: 0.02})
+    even, uneven = (detect_hole(scene.hole_image(), scene.sensor.camera, scene.expected())
+                    for scene in (plain, wavy))
+    assert uneven.sigma < 1.3 * even.sigma
+    assert uneven.correlation < 2.0 * even.correlation
 
 
 @pytest.mark.parametrize("known", [True, False], ids=["nominals", "nothing known"])
