@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 
-from cell.archive.files import read_text, replace_text
+from cell.archive.files import append_line, read_json_lines, replace_text
 from cell.archive.sets import read_active, read_set
 from cell.core.documents.calibration import ActiveDocument, HandEyeDocument, SensorDocument
 from cell.core.documents.text import dump, parse
@@ -41,9 +40,8 @@ def activate(folder: Path, set_id: str, *, by: str, at: str, reason: str = "") -
 
 def history(folder: Path) -> tuple[ActiveDocument, ...]:
     """Read all activations of a cell, oldest first."""
-    file = folder / HISTORY
-    lines = read_text(file).splitlines() if file.exists() else []
-    past = [ActiveDocument.model_validate_json(line) for line in lines if line.endswith("}")]
+    past = [ActiveDocument.model_validate_json(line)
+            for line in read_json_lines(folder / HISTORY)]
     now = read_active(folder)
     return tuple(past if now in past[-1:] else [*past, now])
 
@@ -75,12 +73,6 @@ def _serials(folder: Path, set_id: str) -> tuple[str | None, ...]:
 
 def _note(folder: Path, active: ActiveDocument) -> None:
     """Append an activation unless it is the last line; a crash between two steps is made good."""
-    file = folder / HISTORY
     line = json.dumps(active.model_dump())
-    known = read_text(file) if file.exists() else ""
-    if line in known.splitlines()[-1:]:
-        return
-    with file.open("a", encoding="utf-8") as stream:
-        stream.write(("" if known.endswith("\n") or not known else "\n") + line + "\n")
-        stream.flush()
-        os.fsync(stream.fileno())
+    if line not in read_json_lines(folder / HISTORY)[-1:]:
+        append_line(folder / HISTORY, line)

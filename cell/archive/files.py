@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import tempfile
+from contextlib import suppress
 from pathlib import Path
 
 from cell.core.errors import DocumentError
@@ -47,13 +49,15 @@ def read_bytes(path: Path, most: int) -> bytes:
 
 
 def replace_text(path: Path, text: str) -> None:
-    """Write a file in one step: after a crash it has the old text or the new, never a part.
+    """Write a file in one step: after a crash it has the old text or the new, never a part. Its
+    folder is made where there is none.
 
     Raises:
         DocumentError: the folder cannot be written.
     """
     beside = path.with_name(f".{path.name}.{os.getpid()}")
     try:
+        path.parent.mkdir(exist_ok=True)
         with beside.open("w", encoding="utf-8") as file:
             file.write(text)
             file.flush()
@@ -61,7 +65,8 @@ def replace_text(path: Path, text: str) -> None:
         beside.replace(path)
         sync(path.parent)
     except OSError as error:
-        beside.unlink(missing_ok=True)
+        with suppress(OSError):
+            beside.unlink()
         raise DocumentError(f"cannot be written: {error.strerror}", source=str(path)) from None
 
 
@@ -103,6 +108,29 @@ def _is_json(line: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def check_writable(folder: Path, what: str) -> None:
+    """Make a folder where it is absent, and try that a megabyte can be written there.
+
+    Args:
+        folder: where something will be written later.
+        what: what that will be, for the sentence.
+
+    Raises:
+        DocumentError: it is a file, cannot be made or written, or is full.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder) as trial:
+            trial.write(bytes(1_000_000))
+            trial.flush()
+    except FileExistsError:
+        raise DocumentError(f"expected a folder for {what}; came a file",
+                            source=str(folder)) from None
+    except OSError as error:
+        raise DocumentError(f"{what} cannot be written here: {error.strerror}",
+                            source=str(folder)) from None
 
 
 def sync(path: Path) -> None:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import secrets
-import tempfile
 from datetime import UTC, datetime
 from pathlib import Path
 
+from cell.archive.files import check_writable
 from cell.core.errors import DocumentError
 
 PICTURE = ".audit.rrd"  # what an audit drew beside a recording
@@ -33,17 +33,7 @@ def check_logs(folder: Path) -> None:
     Raises:
         DocumentError: it is a file, cannot be made or written, or is full.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder) as trial:
-            trial.write(bytes(1_000_000))
-            trial.flush()
-    except FileExistsError:
-        raise DocumentError("expected a folder for the recordings; came a file",
-                            source=str(folder)) from None
-    except OSError as error:
-        raise DocumentError(f"recordings cannot be written here: {error.strerror}",
-                            source=str(folder)) from None
+    check_writable(folder, "recordings")
 
 
 def choose_log(log: Path) -> Path:

@@ -20,10 +20,11 @@ def approve(job: Path = typer.Argument(..., help="The job's file, jobs/JOB.yaml.
 
     A shift with papers that are not approved runs, and everything it measures is marked TRIAL.
     """
+    from cell.archive.logs import check_logs
     from cell.programs.approve import approve_job, withdraw_job
     from cell.programs.results import opened, utc
 
-    logs.mkdir(parents=True, exist_ok=True)
+    check_logs(logs)
     with opened(logs) as database:
         if withdraw:
             count = withdraw_job(database, job, cell)

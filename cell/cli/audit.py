@@ -99,7 +99,8 @@ def _audit_with_progress(logs: Sequence[Path], question: Question, workers: int,
             executor = stack.enter_context(cluster(cluster_address))
         elif workers > 1 or question.unsealed:  # what no seal vouches for may take a process down
             executor = stack.enter_context(processes(workers))
-        bar = stack.enter_context(Progress(console=console, transient=True))
+        bar = stack.enter_context(Progress(console=console, transient=True,
+                                           disable=not console.is_terminal))
         task = bar.add_task("auditing", total=len(logs))
         for each in audit_each(logs, question, executor,
                                lambda holes: bar.update(task, description=f"hole {holes}")):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
@@ -24,6 +25,7 @@ Json: TypeAlias = Any
 
 COLOURS = {"identical": "green", "reproduced": "green", "differs": "red", "refused": "red",
            "failed": "red", "stays": "green", "changes": "red"}
+MANY = {"differs": "differ", "stays": "stay", "changes": "change"}
 MARKS = {True: "[green]yes[/]", False: "[red]no [/]", None: "[yellow]–  [/]"}
 WIDE = 120  # characters
 MOST = 24  # rows of a table; all are in the JSON
@@ -74,8 +76,9 @@ def _print_table(table: Table) -> None:
 def print_row(audits: Sequence[LogAudit], folders: Sequence[FolderAudit]) -> None:
     """Print what came of all recordings together, and of the rows of folders."""
     if len(audits) != 1:
-        words = [f"{sum(audit.answer == answer for audit in audits)} {answer}"
-                 for answer in COLOURS if any(audit.answer == answer for audit in audits)]
+        counts = Counter[str](audit.answer for audit in audits)
+        words = [f"{counts[answer]} {answer if counts[answer] == 1 else MANY.get(answer, answer)}"
+                 for answer in COLOURS if counts[answer]]
         answers.print(f"{len(audits)} recordings: {', '.join(words)}", highlight=False)
     for folder in folders:
         for finding in folder.findings:

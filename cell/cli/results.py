@@ -40,11 +40,14 @@ def list_results(logs: Path = LOGS, database: str | None = URL, since: datetime 
                  production: bool = PRODUCTION, last: int | None = LAST,
                  as_json: bool = JSON) -> None:
     """List bodies, the latest first."""
-    from cell.programs.results import opened, refuse_nothing
+    from cell.programs.results import count_unbooked, opened, refuse_nothing
     from cell.results.query import list_bodies
 
     wanted = _filter(since, until, job, verdict, production, last)
     with opened(logs, database) as found:
+        if unbooked := 0 if database else count_unbooked(found, logs):
+            console.print(f"{unbooked} recordings here are not in the database yet: "
+                          "`cell results rebuild` takes them in", highlight=False, soft_wrap=True)
         refuse_nothing(found, wanted)
         rows = list_bodies(found, wanted)
     if as_json:
@@ -127,7 +130,7 @@ def rebuild_results(logs: Path = LOGS, database: str | None = URL, as_json: bool
     from cell.programs.results import opened, rebuild
 
     with opened(logs, database, any_schema=True) as found, \
-            Progress(console=console, transient=True) as progress:
+            Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task("recordings", total=None)
         troubles = rebuild(found, logs, lambda done, of: progress.update(task, completed=done,
                                                                          total=of))

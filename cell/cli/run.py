@@ -77,7 +77,8 @@ class _Progress:
 
         self._bar = Progress(TextColumn("[bold]{task.description:<28}"), BarColumn(),
                              MofNCompleteColumn(), TextColumn("holes, time left"),
-                             TimeRemainingColumn(), console=console, transient=True)
+                             TimeRemainingColumn(), console=console, transient=True,
+                             disable=not console.is_terminal)
         self._task = self._bar.add_task("checking the way", total=None)
 
     def __enter__(self) -> _Progress:

@@ -107,7 +107,7 @@ def _read(log: Path) -> Recorded:
     if not chain.passed:
         raise DocumentError(f"not as it was recorded: {chain.words}", source=str(log))
     if status != "complete":
-        raise DocumentError(f"expected a complete run; this one was {status}", source=str(log))
+        raise DocumentError(f"expected a complete run; this one ended: {status}", source=str(log))
     papers = Papers.parse(start.papers, start.set_id)
     return Recorded(log, start, papers, judge_master_run(papers, start, records))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 from cell.core.documents.papers import Papers
@@ -32,5 +33,7 @@ def write_page(page: str, path: Path) -> Path:
     try:
         path.write_text(page, encoding="utf-8")
     except OSError as error:
+        with suppress(OSError):
+            path.unlink()  # no part of a report may pass for one
         raise RecordingError(f"the report {path} cannot be written: {error.strerror}") from error
     return path

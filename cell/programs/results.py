@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -12,13 +13,21 @@ from typing import TextIO
 
 from sqlalchemy import Connection, select
 
+from cell.archive.logs import PICTURE
 from cell.core.documents.papers import Papers
 from cell.core.documents.record import HoleRecord, Start, Stop
 from cell.core.errors import DocumentError
 from cell.metrology.judge.decide import judge_run
+from cell.recording.integrity import COPIES
 from cell.recording.pages import read_pages, without_images
 from cell.results.booking import BodyRows, Booking, Row, body_rows, book
-from cell.results.database import Database, connect, open_database, recreate_results
+from cell.results.database import (
+    Database,
+    connect,
+    open_database,
+    read_database,
+    recreate_results,
+)
 from cell.results.query import Filter, list_bodies
 from cell.results.tables import bodies
 
@@ -31,14 +40,41 @@ COLUMNS = ("body_id", "recording_id", "time_utc", "job", "cell", "set_id", "tria
 
 @contextmanager
 def opened(logs: Path, url: str | None = None, *, any_schema: bool = False) -> Iterator[Database]:
-    """Open the database at `url`, or the cell's own beside its recordings; close it afterwards."""
+    """Open the database at `url`, or the cell's own beside its recordings; close it afterwards.
+
+    Where the cell's own cannot be written it is opened for reading: an auditor has a copy.
+    """
     if url is None and not logs.is_dir():
         raise DocumentError("there is no such folder of recordings", source=str(logs))
-    database = (connect if any_schema else open_database)(url or logs / FILE)
+    if url is None and not any_schema and not _is_writable(logs):
+        database = read_database(logs / FILE)
+    else:
+        database = (connect if any_schema else open_database)(url or logs / FILE)
     try:
         yield database
     finally:
         database.close()
+
+
+def _is_writable(logs: Path) -> bool:
+    """SQLite writes its file, and more files beside it, even to read."""
+    return all(os.access(path, os.W_OK) for path in (logs, logs / FILE) if path.exists())
+
+
+def count_unbooked(database: Database, logs: Path) -> int:
+    """Count the recordings of a folder that have no row: those of `cell run`, until a rebuild."""
+    with database.transaction() as connection:
+        known = {_original(log) for log in connection.execute(select(bodies.c.log)).scalars()}
+    here = {_original(log.name) for log in logs.glob("*.rrd") if not log.name.endswith(PICTURE)}
+    return len(here - known)
+
+
+def _original(log: str) -> str:
+    """Name the recording that a repaired or pruned copy was made from: one body, one row."""
+    stem = log.removesuffix(".rrd")
+    for copied in COPIES:
+        stem = stem.removesuffix(f".{copied}")
+    return stem
 
 
 def rebuild(database: Database, logs: Path, watch: Callable[[int, int], None]) -> list[str]:

@@ -38,7 +38,8 @@ def check_seal(log: Path, trusted: Collection[str] = ()) -> tuple[Seal | None, l
     """
     path = seal_path(log)
     if not os.path.lexists(path):
-        return None, [Check("seal", None, "unsealed: there is no seal beside it")]
+        return None, [Check("seal", None, "unsealed: there is no seal beside it (of a run that "
+                                          "died, `cell repair` seals what is whole)")]
     try:
         seal = read_seal(path)
     except DocumentError as error:

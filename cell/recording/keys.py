@@ -30,7 +30,13 @@ ENVIRONMENT = "CELL_SEAL_KEY"
 def key_path() -> Path:
     """Return where the private key of this account lies, or would lie."""
     named = os.environ.get(ENVIRONMENT)
-    return Path(named) if named else Path.home() / ".config" / "cell" / "seal.key"
+    if named:
+        return Path(named)
+    try:
+        home = Path.home()
+    except RuntimeError:  # a user id without an account, as in a container
+        home = Path("/")
+    return home / ".config" / "cell" / "seal.key"
 
 
 def new_key(path: Path) -> Ed25519PrivateKey:

@@ -14,7 +14,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from rerun.chunk import LazyChunkStream, RrdReader
 
-from cell.core.errors import DocumentError
+from cell.core.errors import CellError, DocumentError
 from cell.recording.forms import Plain, plains_of
 from cell.recording.framing import copy_whole, read_frame
 from cell.recording.layout import is_audited
@@ -109,7 +109,7 @@ def damage_explained(path: Path) -> Iterator[None]:
     """Turn whatever a foreign parser raises over damaged content into one sentence."""
     try:
         yield
-    except DocumentError:
+    except CellError:
         raise
     except Exception as error:
         raise DocumentError(f"is damaged: {error}", source=str(path)) from error

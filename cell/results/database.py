@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from sqlalchemy import (
     Connection,
@@ -78,6 +79,29 @@ class Database:
         return self._engine.url.render_as_string(hide_password=True)
 
 
+def read_database(file: Path) -> Database:
+    """Open an SQLite file that cannot be written, or whose folder cannot: for reading alone.
+
+    Raises:
+        DocumentError: there is none, or the schema is another one.
+        DatabaseError: it cannot be read.
+    """
+    if not file.exists():
+        raise DocumentError("there is no results database here, and none can be made: its folder "
+                            "is read-only", source=str(file))
+    # What is not in the file yet is in its log, which only a changing database has beside it.
+    changing = file.with_name(f"{file.name}-wal").exists()
+    how = "mode=ro" if changing else "immutable=1"
+    database = Database(create_engine(f"sqlite:///file:{quote(str(file.resolve()))}?{how}&uri=true"))
+    try:
+        with database.transaction() as connection:
+            check_schema(connection, str(file))
+    except CellError:
+        database.close()
+        raise
+    return database
+
+
 def open_database(where: str | Path) -> Database:
     """Open the database at a URL or in an SQLite file, and create its tables where there are none.
 
@@ -110,11 +134,19 @@ def prepare(connection: Connection, source: str) -> None:
     Raises:
         DocumentError: the schema is another one.
     """
-    found = _schema(connection)
-    if found is None:
+    if _schema(connection) is None:
         metadata.create_all(connection)
         connection.execute(insert(meta).values(schema=SCHEMA))
-    elif found != SCHEMA:
+    check_schema(connection, source)
+
+
+def check_schema(connection: Connection, source: str) -> None:
+    """Refuse a database of another schema, or without any.
+
+    Raises:
+        DocumentError: the schema is another one.
+    """
+    if (found := _schema(connection)) != SCHEMA:
         raise DocumentError(f"has schema {found}; this program writes {SCHEMA}: run "
                             "`cell results rebuild`", source=source)
 

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from cell.archive.files import append_line, read_json_lines
+from cell.archive.files import append_line, check_writable, read_json_lines, replace_text
 from cell.core.errors import DocumentError
 
 
@@ -33,3 +33,19 @@ def test_what_cannot_be_written_is_refused(tmp_path):
     (tmp_path / "log").write_text("a file")
     with pytest.raises(DocumentError, match="cannot be written"):
         append_line(tmp_path / "log" / "lines.jsonl", "{}")
+
+
+def test_the_folder_of_a_text_is_made(tmp_path):
+    replace_text(tmp_path / "history" / "a.yaml", "a: 1\n")
+    assert (tmp_path / "history" / "a.yaml").read_text() == "a: 1\n"
+    (tmp_path / "file").touch()
+    with pytest.raises(DocumentError, match="cannot be written"):
+        replace_text(tmp_path / "file" / "a.yaml", "a: 1\n")
+
+
+def test_what_cannot_be_written_later_is_known_before(tmp_path):
+    check_writable(tmp_path / "new" / "folder", "sessions")
+    assert list((tmp_path / "new" / "folder").iterdir()) == []
+    (tmp_path / "file").touch()
+    with pytest.raises(DocumentError, match="expected a folder for sessions; came a file"):
+        check_writable(tmp_path / "file", "sessions")

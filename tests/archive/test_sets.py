@@ -103,3 +103,16 @@ def test_a_folder_that_cannot_be_written_leaves_the_active_set(workplace, second
     finally:
         workplace.cell.chmod(0o755)
     assert (workplace.cell / "active.yaml").read_text() == before
+
+
+def test_a_history_that_cannot_be_written_is_said_and_a_torn_line_is_passed_over(workplace,
+                                                                                 second_set):
+    history_file = workplace.cell / "history.jsonl"
+    activate(workplace.cell, second_set, by="A. Meier", at="2026-11-21T08:05:00Z")
+    with history_file.open("a") as lines:
+        lines.write('{"set": {"torn": 1}')
+    assert history(workplace.cell)[-1].set == second_set
+    history_file.unlink()
+    history_file.mkdir()
+    with pytest.raises(DocumentError, match=r"history\.jsonl"):
+        activate(workplace.cell, second_set, by="A. Meier", at="2026-11-21T08:06:00Z")

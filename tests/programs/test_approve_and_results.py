@@ -6,6 +6,7 @@ import json
 import pytest
 from made_bodies import booking_of
 from made_workplace import Workplace
+from recorded_body import record_body
 from typer.testing import CliRunner
 
 from cell.cli.door import app
@@ -14,6 +15,7 @@ from cell.programs.approve import approval_hashes, approve_job, withdraw_job
 from cell.programs.results import opened
 from cell.results.approvals import approved
 from cell.results.booking import body_rows, book
+from cell.results.query import Filter, list_bodies
 
 
 def _ask(*words):
@@ -127,3 +129,27 @@ def test_a_rebuild_names_what_it_cannot_read(logs):
     (logs / "torn.rrd").write_bytes(b"no recording")
     answer = _ask("results", "rebuild", "--logs", logs, "--json")
     assert answer.exit_code == 1 and "torn.rrd" in json.loads(answer.stdout)["not_read"][0]
+
+
+def test_a_folder_that_cannot_be_written_is_read(logs, monkeypatch):
+    monkeypatch.setattr("os.access", lambda *_: False)  # for whom no permission counts, as well
+    with opened(logs) as database:
+        assert [body["body_id"] for body in list_bodies(database, Filter())] == [
+            "BODY3", "BODY2", "BODY1"]
+
+
+def test_recordings_that_are_not_in_the_database_are_counted(tmp_path, monkeypatch):
+    """`cell run` writes no row: a shift or a rebuild takes its recordings in."""
+    monkeypatch.setenv("CELL_SEAL_KEY", str(tmp_path / "absent.key"))
+    log = record_body(tmp_path / "body.rrd", holes=())
+    (tmp_path / "body.pruned.rrd").write_bytes(log.read_bytes())  # the same body
+    answer = _ask("results", "list", "--logs", tmp_path)
+    assert answer.exit_code == 0 and "1 recordings here are not in the database" in answer.stderr
+    _ask("results", "rebuild", "--logs", tmp_path)
+    assert "are not in" not in _ask("results", "list", "--logs", tmp_path).stderr
+
+
+def test_an_approval_needs_a_folder_that_can_be_written(place, tmp_path):
+    (tmp_path / "file").touch()
+    answer = _ask("approve", place.job, "--by", "A. Meier", "--logs", tmp_path / "file")
+    assert "came a file" in str(answer.exception)

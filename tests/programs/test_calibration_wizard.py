@@ -18,6 +18,7 @@ from cell.core.documents.text import parse
 from cell.core.errors import DocumentError
 from cell.core.geometry import Transform
 from cell.programs.calibration.belief import read_belief
+from cell.programs.calibration.check import CheckRequest, check_cell
 from cell.programs.calibration.session import Session
 from cell.programs.calibration.shown import Shown
 from cell.programs.calibration.solve import before_and_after, solve_session
@@ -188,3 +189,15 @@ def test_warnings_need_a_reason(plant, finished, tmp_path):
     result = conclude(Session.read(folder), belief, operator, Shown(belief, "all", "", None))
     assert result.set_id is None and not result.accepted
     assert operator.heard("Why is this set acceptable") or operator.heard("Refused")
+
+
+@pytest.mark.parametrize(("begin", "place"), [
+    (lambda plant, operator: run_wizard(Request("all", "demo", PLAN, plant), operator), "sessions"),
+    (lambda plant, operator: check_cell(CheckRequest("demo", plant), operator), "drift")])
+def test_what_could_not_be_kept_is_known_before_anything_is_asked(tmp_path, begin, place):
+    plant = Path(shutil.copytree(ROOT / "calibration", tmp_path / "calibration"))
+    (plant / "demo" / place).write_text("not a folder")
+    operator = Scripted()
+    with pytest.raises(DocumentError, match=f"{place}: expected a folder"):
+        begin(plant, operator)
+    assert operator.said == []

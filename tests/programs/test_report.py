@@ -1,9 +1,12 @@
 """A report made again says what the recording says, and none is made of an altered one."""
 
+import resource
+from contextlib import contextmanager
+
 import pytest
 from recorded_body import measured_anew, record_body
 
-from cell.core.errors import DocumentError
+from cell.core.errors import DocumentError, RecordingError
 from cell.programs.report import report_log
 from cell.programs.results import read_rows
 from cell.recording.prune import prune
@@ -39,3 +42,25 @@ def test_a_pruned_recording_is_reported_without_pictures(log):
     page = report_log(log.with_name(prune(log).file)).read_text()
     assert "QP2" in page
     assert "data:image" not in page
+
+
+@contextmanager
+def full_disk(most_bytes):
+    """Let no file grow beyond so many bytes, as a disk that is full."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_no_part_of_a_report_passes_for_one(log):
+    with full_disk(20_000), pytest.raises(RecordingError, match="cannot be written"):
+        report_log(log)
+    assert not log.with_suffix(".html").exists()
+
+
+def test_a_copy_that_does_not_fit_is_no_damage_of_the_recording(log):
+    with full_disk(20_000), pytest.raises(RecordingError, match=r"pruned\.rrd: cannot be written"):
+        prune(log)

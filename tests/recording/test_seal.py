@@ -9,7 +9,7 @@ import pytest
 
 from cell.core.errors import DocumentError, RecordingError
 from cell.recording.integrity import check_chain, check_images, check_seal
-from cell.recording.keys import key_id, new_key, read_key, read_public_key
+from cell.recording.keys import key_id, key_path, new_key, read_key, read_public_key
 from cell.recording.reader import read
 from cell.recording.seal import Closed, read_seal, seal_path, write_seal
 from cell.recording.writer import Recorder
@@ -149,3 +149,13 @@ def test_a_file_that_is_no_key_is_refused(tmp_path):
     with pytest.raises(DocumentError, match="Ed25519"):
         read_public_key(path)
     assert read_key(tmp_path / "absent.key") is None
+
+
+def test_an_account_without_a_home_has_no_key(monkeypatch):
+    """A user id without an account, as a container has it."""
+    def nowhere():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("CELL_SEAL_KEY", raising=False)
+    monkeypatch.setattr(Path, "home", nowhere)
+    assert read_key(key_path()) is None

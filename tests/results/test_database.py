@@ -9,7 +9,12 @@ from sqlalchemy import func, insert, select, text, update
 from cell.core.errors import DocumentError
 from cell.results.approvals import approve, approved, withdraw
 from cell.results.booking import body_rows, book, hash_texts
-from cell.results.database import DatabaseError, open_database, recreate_results
+from cell.results.database import (
+    DatabaseError,
+    open_database,
+    read_database,
+    recreate_results,
+)
 from cell.results.query import Filter, export_rows, list_bodies, show_body, trend
 from cell.results.tables import approvals, axes, bodies, calibrations, features, meta
 
@@ -197,3 +202,30 @@ def test_integrity_is_the_databases_own(database):
     with pytest.raises(DatabaseError), database.transaction() as connection:
         connection.execute(insert(features), {"body": 4711, "feature": "H0", "position": 0,
                                               "verdict": "in_tolerance"})
+
+
+@pytest.mark.parametrize("changing", [False, True])
+def test_a_database_is_read_without_touching_it(tmp_path, changing):
+    """As an auditor does on a copy that cannot be written; a shift may be running beside it."""
+    file = tmp_path / "results.sqlite"
+    writing = open_database(file)
+    _book(writing, booking_of(1))
+    if not changing:
+        writing.close()
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    reading = read_database(file)
+    assert [body["body_id"] for body in list_bodies(reading, Filter())] == ["BODY1"]
+    with pytest.raises(DatabaseError, match="readonly"):
+        _book(reading, booking_of(2))
+    reading.close()
+    if not changing:
+        assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    writing.close()
+
+
+def test_a_database_that_is_not_there_is_not_made_for_reading(tmp_path):
+    with pytest.raises(DocumentError, match="there is no results database here"):
+        read_database(tmp_path / "results.sqlite")
+    (tmp_path / "results.sqlite").touch()
+    with pytest.raises(DocumentError, match="has schema None"):
+        read_database(tmp_path / "results.sqlite")

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from cell.archive.files import check_writable
 from cell.archive.papers import read_papers
 from cell.core.documents.base import as_rows
 from cell.core.documents.calibration import BodyDocument
@@ -26,7 +27,7 @@ from cell.metrology.judge.datum import (
     solve_body_registration,
 )
 from cell.metrology.plan.stops import PlannedStop
-from cell.programs.calibration.drift_log import REGISTERED, append_check
+from cell.programs.calibration.drift_log import LOG, REGISTERED, append_check
 from cell.programs.calibration.recorded import read_gates
 from cell.programs.calibration.registrations import write_registration
 from cell.programs.inspection.chase import Chase
@@ -76,6 +77,8 @@ def register_body(request: BodyRequest, operator: Operator) -> Registered:
     if len(chosen) < FEWEST_DATUMS:
         raise DocumentError(f"{len(chosen)} datum holes with CMM values; {FEWEST_DATUMS} at least, "
                             "six or more are wanted", source=str(request.job))
+    for place in (LOG, "body/history"):
+        check_writable((prepared.folder / place).parent, "registrations")
     if not operator.confirm("Is the master body in the fixture, clamped, and the way clear?"):
         raise DocumentError("stopped by the operator")
     with open_station(prepared.papers.station, prepared.folder, request.speed) as station:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from cell.archive.files import check_writable
 from cell.core.documents.calibration_session import CalibrationPlan
 from cell.core.documents.papers import check_identity
 from cell.core.documents.targets import BoardDocument, SphereDocument
@@ -20,7 +21,7 @@ from cell.metrology.calibrate.gates import Checked, Level, worst
 from cell.metrology.study.drift import Drift, judge_drift
 from cell.programs.calibration.belief import Belief, design_of, read_belief
 from cell.programs.calibration.capture import drive, shoot
-from cell.programs.calibration.drift_log import CORRECTED, append_check, read_past
+from cell.programs.calibration.drift_log import CORRECTED, LOG, append_check, read_past
 from cell.programs.calibration.poses import free_path, plan_poses, plan_sphere, plan_start
 from cell.programs.calibration.recorded import read_gates
 from cell.programs.calibration.registrations import apply_corrections, plan_corrections
@@ -76,6 +77,7 @@ def check_cell(request: CheckRequest, operator: Operator) -> CheckedCell:
         DeviceError: a device failed.
     """
     belief = read_belief(request.calibration, request.cell)
+    check_writable((belief.folder / LOG).parent, "checks")
     if not operator.confirm("The arm will look at the boards and spheres. Is the way clear?"):
         raise DocumentError("stopped by the operator")
     with open_station(belief.station, belief.folder, request.speed) as station:

@@ -13,6 +13,7 @@ from cell.core.documents.base import as_rows
 from cell.core.documents.calibration import HandEyeDocument, SensorDocument
 from cell.core.documents.calibration_session import SessionHeader
 from cell.core.documents.text import dump
+from cell.core.errors import DocumentError
 from cell.core.geometry import Array
 from cell.programs.calibration.belief import Belief
 from cell.programs.calibration.session import Session
@@ -37,7 +38,10 @@ def make_set(session: Session, solution: Solution, belief: Belief, signature: Si
     """
     made = belief.folder / f".making-{session.folder.name}"
     shutil.rmtree(made, ignore_errors=True)
-    shutil.copytree(session.folder, made)
+    try:
+        shutil.copytree(session.folder, made)
+    except OSError as error:  # of many files, each with its own reason
+        raise DocumentError(f"the session cannot be copied: {error}", source=str(made)) from None
     replace_text(made / "sensor.yaml", dump(sensor_document(solution, belief)))
     replace_text(made / "hand_eye.yaml", dump(hand_eye_document(session, solution, belief)))
     if (kinematics := chain_of(solution, belief).kinematics) is not None:

@@ -24,7 +24,6 @@ def write_registration(file: Path, document: BodyDocument) -> None:
     """
     if file.exists():
         past = file.parent / "history"
-        past.mkdir(exist_ok=True)
         now = datetime.now(UTC).strftime("%Y-%m-%dT%H%M%SZ")
         replace_text(past / f"{file.stem}-until-{now}.yaml", file.read_text("utf-8"))
     replace_text(file, dump(document))

@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from cell.archive.activation import activate
+from cell.archive.files import check_writable
 from cell.core.documents.calibration_session import CalibrationPlan, SessionHeader, What
 from cell.core.ports import Operator
 from cell.programs.calibration.belief import Belief, read_belief
@@ -58,6 +59,7 @@ def run_wizard(request: Request, operator: Operator) -> Finished:
         DeviceError: a device failed; what was captured is on the disk, `resume` goes on.
     """
     belief = read_belief(request.calibration, request.cell)
+    check_writable(belief.folder / "sessions", "sessions")
     with LiveView() if request.live else nullcontext() as live:
         shown = Shown(belief, request.what, f"calibration-{_now('%Y-%m-%dT%H%M%SZ')}", live)
         session = _capture(request, belief, operator, shown)
