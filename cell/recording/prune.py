@@ -12,7 +12,7 @@ from cell.recording import layout
 from cell.recording.integrity import check_seal
 from cell.recording.keys import key_path, read_key
 from cell.recording.rows import open_chunks
-from cell.recording.seal import Closed, Seal, reference, write_seal
+from cell.recording.seal import Closed, Seal, reference, sealed_or_removed, write_seal
 
 
 def prune(log: Path) -> Seal:
@@ -29,10 +29,12 @@ def prune(log: Path) -> Seal:
     copy = log.with_name(f"{log.stem}.pruned.rrd")
     if copy.exists():
         raise DocumentError("exists already: it was pruned before", source=str(copy))
-    _copy_without_images(log, copy, seal.recording_id)
+    key = read_key(key_path())
     closed = Closed(seal.chain, seal.holes, "pruned", seal.recording_id, seal.versions,
                     original=reference(log))
-    return write_seal(copy, closed, read_key(key_path()))
+    with sealed_or_removed(copy):
+        _copy_without_images(log, copy, seal.recording_id)
+        return write_seal(copy, closed, key)
 
 
 def _copy_without_images(log: Path, copy: Path, recording_id: str) -> None:

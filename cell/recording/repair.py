@@ -14,7 +14,14 @@ from cell.core.errors import DocumentError, RecordingError
 from cell.recording.framing import copy_whole
 from cell.recording.keys import key_path, read_key
 from cell.recording.pages import read_pages
-from cell.recording.seal import Closed, Seal, reference, seal_path, write_seal
+from cell.recording.seal import (
+    Closed,
+    Seal,
+    reference,
+    seal_path,
+    sealed_or_removed,
+    write_seal,
+)
 
 
 def repair(log: Path) -> Seal:
@@ -31,8 +38,9 @@ def repair(log: Path) -> Seal:
     key = read_key(key_path())
     closed = _what_is_whole(log)
     copy = log.with_name(f"{log.stem}.repaired.rrd")
-    _copy(log, copy)
-    return write_seal(copy, closed, key)
+    with sealed_or_removed(copy):
+        _copy(log, copy)
+        return write_seal(copy, closed, key)
 
 
 def _what_is_whole(log: Path) -> Closed:

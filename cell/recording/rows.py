@@ -14,7 +14,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from rerun.chunk import LazyChunkStream, RrdReader
 
-from cell.core.errors import CellError, DocumentError
+from cell.core.errors import CellError, DocumentError, RecordingError
 from cell.recording.forms import Plain, plains_of
 from cell.recording.framing import copy_whole, read_frame
 from cell.recording.layout import is_audited
@@ -64,6 +64,7 @@ def read_rows(path: Path) -> Iterator[Row]:
 
     Raises:
         DocumentError: it cannot be read, is no recording, or its content is damaged.
+        RecordingError: it is torn, and there is no room for the copy that it is read from.
     """
     with open_chunks(path) as chunks:
         for chunk in chunks:
@@ -78,6 +79,7 @@ def open_chunks(path: Path) -> Iterator[LazyChunkStream]:
 
     Raises:
         DocumentError: it cannot be read, is no recording, or its content is damaged.
+        RecordingError: it is torn, and there is no room for the copy that it is read from.
     """
     with _readable(path) as readable, damage_explained(path):
         yield _open(readable, path)
@@ -90,7 +92,11 @@ def _readable(path: Path) -> Iterator[Path]:
         yield path
         return
     with tempfile.NamedTemporaryFile(suffix=".rrd") as copy:
-        copy_whole(path, copy)
+        try:
+            copy_whole(path, copy)
+        except OSError as error:
+            raise RecordingError(f"{path}: is torn, and cannot be copied to {copy.name} to be "
+                                 f"read: {error.strerror}") from None
         yield Path(copy.name)
 
 

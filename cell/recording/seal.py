@@ -13,7 +13,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import lru_cache
@@ -91,6 +91,21 @@ class Closed:
 def seal_path(log: Path) -> Path:
     """Return where the seal of a recording lies."""
     return log.with_name(log.name + SUFFIX)
+
+
+@contextmanager
+def sealed_or_removed(copy: Path) -> Iterator[None]:
+    """Leave no copy that is not whole and sealed: it would pass for one that was made before.
+
+    A DocumentError is about what was there already, which stays.
+    """
+    try:
+        yield
+    except BaseException as failure:
+        if not isinstance(failure, DocumentError):
+            with suppress(OSError):
+                copy.unlink()
+        raise
 
 
 def write_seal(log: Path, closed: Closed, key: Ed25519PrivateKey | None) -> Seal:

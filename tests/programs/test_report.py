@@ -7,9 +7,12 @@ import pytest
 from recorded_body import measured_anew, record_body
 
 from cell.core.errors import DocumentError, RecordingError
+from cell.programs.audit.log import audit_log
+from cell.programs.audit.question import Question
 from cell.programs.report import report_log
 from cell.programs.results import read_rows
 from cell.recording.prune import prune
+from cell.recording.repair import repair
 from cell.recording.seal import seal_path
 
 
@@ -64,3 +67,17 @@ def test_no_part_of_a_report_passes_for_one(log):
 def test_a_copy_that_does_not_fit_is_no_damage_of_the_recording(log):
     with full_disk(20_000), pytest.raises(RecordingError, match=r"pruned\.rrd: cannot be written"):
         prune(log)
+    assert prune(log).status == "pruned"  # nothing is left that would pass for a copy
+
+
+def test_a_torn_recording_is_repaired_once_there_is_room(log):
+    torn = log.with_name("torn.rrd")
+    torn.write_bytes(log.read_bytes()[:-300_000])
+    with full_disk(20_000):
+        with pytest.raises(RecordingError, match="cannot be copied"):
+            repair(torn)
+        assert audit_log(torn, Question(unsealed=True)).exit_code() == 4  # no word about it
+    assert (repair(torn).status, torn.exists()) == ("repaired", True)
+    with pytest.raises(DocumentError, match="it was repaired before"):
+        repair(torn)
+    assert torn.with_name("torn.repaired.rrd").exists()

@@ -11,7 +11,7 @@ from cell.core.errors import DocumentError, RecordingError
 from cell.recording.integrity import check_chain, check_images, check_seal
 from cell.recording.keys import key_id, key_path, new_key, read_key, read_public_key
 from cell.recording.reader import read
-from cell.recording.seal import Closed, read_seal, seal_path, write_seal
+from cell.recording.seal import Closed, read_seal, seal_path, sealed_or_removed, write_seal
 from cell.recording.writer import Recorder
 
 
@@ -159,3 +159,14 @@ def test_an_account_without_a_home_has_no_key(monkeypatch):
     monkeypatch.delenv("CELL_SEAL_KEY", raising=False)
     monkeypatch.setattr(Path, "home", nowhere)
     assert read_key(key_path()) is None
+
+
+@pytest.mark.parametrize(("failure", "stays"), [
+    (RecordingError("full"), False), (KeyboardInterrupt(), False),
+    (DocumentError("exists already"), True)])
+def test_a_copy_that_was_not_sealed_is_removed(tmp_path, failure, stays):
+    copy = tmp_path / "a.repaired.rrd"
+    copy.touch()
+    with pytest.raises(type(failure)), sealed_or_removed(copy):
+        raise failure
+    assert copy.exists() == stays

@@ -12,7 +12,7 @@ from cell.archive.sets import CALIBRATION, read_set
 from cell.core.documents.job import JobDocument
 from cell.core.documents.record import Start
 from cell.core.documents.text import parse
-from cell.core.errors import DocumentError
+from cell.core.errors import CellError, DocumentError
 from cell.metrology.locate.pair import Method
 from cell.programs.audit.folder import FolderAudit, audit_folder
 from cell.programs.audit.question import WhatIf
@@ -114,6 +114,6 @@ def _set_folder(name: str) -> Path:
 def _started(log: Path) -> float | None:
     try:
         first = next(read_pages(log)).record
-    except DocumentError:
+    except CellError:
         return None
     return first.started if isinstance(first, Start) else None
