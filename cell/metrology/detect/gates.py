@@ -15,6 +15,7 @@ from cell.metrology.detect.band import Band, sample_band, spread
 from cell.metrology.detect.edges import find_edges
 from cell.metrology.detect.ellipse import Ellipse
 from cell.metrology.detect.find_holes import MARGIN, RAYS, Hole, within
+from cell.metrology.detect.opening import LEAST_GAP, UNLIKE
 from cell.metrology.detect.ridge import Ridge
 from cell.metrology.reasons import Reason, refusal
 from cell.metrology.spread import quantile
@@ -22,8 +23,6 @@ from cell.metrology.spread import quantile
 COMPLETE = 0.75  # of the rim has to be seen
 DARK, WHITE = 20.0, 254  # grey values of 255
 MOSTLY = 0.5     # of the picture
-LEAST_GAP = 16   # px of the stripe, that an opening interrupts
-UNLIKE = 0.3     # of the brighter one, by which opening and sheet differ
 CLEAR = 20.0     # times what the profiles leave unexplained
 TOO_SOFT = 3.0   # px of blur
 FLATTEST = 0.75  # minor over major axis: a tilt of 41 degrees

@@ -7,17 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 
+from cell.core.errors import UnmeasurableError
 from cell.core.observation import Image
-from cell.core.optics import SensorModel
+from cell.core.optics import CameraModel, SensorModel
 from cell.metrology.detect.find_holes import Hole, find_holes
-from cell.metrology.detect.gates import COMPLETE, LEAST_GAP, check_lit, is_white, why_no_hole
+from cell.metrology.detect.gates import COMPLETE, check_lit, is_white, why_no_hole
 from cell.metrology.detect.hole import detect_rim
+from cell.metrology.detect.opening import LEAST_GAP, name_opening
 from cell.metrology.detect.ridge import Ridge, find_ridges, ground_along, runs_upright, shows_in
 from cell.metrology.detect.stripe import crosses, falls_into, follow_stripe
 from cell.metrology.features import Expected, Rim, Stripe
 from cell.metrology.reasons import Reason, refusal
 from cell.metrology.spread import middle
 
+DOUBTFUL = ("slot", "half_occluded", "not_round", "hole_cut_by_border", "too_dark")
 FAINT = 0.2       # of the contrast of another hole in the same picture
 CLEAR, ALIKE = 3.0, 0.4  # times its ground: no scratch; of that in one image, in the other
 ANYWHERE = 100.0  # mm, the standard deviation of where a hole may be in the picture
@@ -39,8 +42,23 @@ def detect_pair(hole_image: Image, stripe_image: Image, sensor: SensorModel,
         raise refusal("no_laser")
     check_lit(hole_image)
     ridge, hole, placed = _choose(ridges, hole_image, sensor, expected)
-    rim = detect_rim(hole_image, hole, sensor.camera, placed)
+    rim = _detect_rim(hole_image, hole, ridge, sensor.camera, placed)
     return rim, follow_stripe(stripe_image, ridge, rim, sensor, expected)
+
+
+def _detect_rim(image: Image, hole: Hole, ridge: Ridge, camera: CameraModel,
+                expected: Expected) -> Rim:
+    """Locate the rim of a hole. Where its size is unknown, anything may have been taken for a rim:
+    then the opening's outline tells better why it is none.
+    """
+    try:
+        return detect_rim(image, hole, camera, expected)
+    except UnmeasurableError as refused:
+        by_rim = expected.radius is not None or refused.reason not in DOUBTFUL
+        reason = None if by_rim else name_opening(image, ridge)
+        if reason is None:
+            raise
+        raise refusal(reason) from refused
 
 
 def _choose(ridges: list[Ridge], image: Image, sensor: SensorModel,

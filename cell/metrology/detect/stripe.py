@@ -49,6 +49,8 @@ def follow_stripe(image: Image, ridge: Ridge, rim: Rim, sensor: SensorModel,
     _check_length(side)
     miss, scale = _straightness(points, sensor.camera, ridge.upright)
     good = np.abs(miss) < 3.5 * scale
+    if _shorter(side[good]) < LEAST_LINES:
+        raise refusal("stripe_segments_disagree", "they lie on no common line")
     sigma, correlation = robust_sigma(miss[good]), correlation_length(miss[good])
     gap, unsure = _gap(points[good][:, 1 if ridge.upright else 0], miss[good], side[good])
     if abs(gap) > LARGEST_GAP + 3.5 * unsure:
@@ -58,8 +60,13 @@ def follow_stripe(image: Image, ridge: Ridge, rim: Rim, sensor: SensorModel,
 
 
 def _check_length(side: Array) -> None:
-    if min((side < 0).sum(), (side > 0).sum()) < LEAST_LINES:
+    if _shorter(side) < LEAST_LINES:
         raise refusal("stripe_too_short")
+
+
+def _shorter(side: Array) -> int:
+    """Count the lines of the side that has fewer."""
+    return int(min((side < 0).sum(), (side > 0).sum()))
 
 
 def _gap(along: Array, miss: Array, side: Array) -> tuple[float, float]:
