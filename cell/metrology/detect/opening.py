@@ -19,9 +19,9 @@ from cell.metrology.reasons import Reason
 LEAST_GAP = 16     # px of the stripe, that an opening interrupts
 UNLIKE = 0.3       # of the brighter one, by which opening and sheet differ
 APPENDED = 0.2     # of the opening's size: what is narrower is dirt or shadow beside it
-CLOSE = 0.03       # of the box's shorter side: so near, an outline runs along it
+CLOSE = 0.05       # of the box's shorter side: so near, an outline runs along it
 STEPS = 24         # parts of a side
-STRAIGHT = 0.55    # of every side of a square; a circle runs along a third
+STRAIGHT = 0.6    # of every side of a square; a circle runs along less than half
 ONE_SIDED = 0.25   # of a side, by which a straight one differs from the one opposite
 LONG = 1.15        # times as long as wide: a slot
 

@@ -36,7 +36,7 @@ def pictured(shape, turn_deg, *, shift=(0.0, 0.0), seed=3):
     points = shape @ matrix.T + np.array(SIZE) / 2.0 + shift
     opening = cv2.fillPoly(np.zeros(SIZE[::-1], np.uint8), [np.rint(points).astype(np.int32)], 1)
     sheet = 120.0 + 8.0 * cv2.GaussianBlur(rng.normal(size=opening.shape), (0, 0), 2.0) / 0.14
-    for place in points[::40]:
+    for place in points[::80]:
         cv2.circle(sheet, tuple(int(c) for c in place), 4, 40.0, -1)
     stripe = 160.0 * np.exp(-0.5 * ((np.arange(SIZE[0]) - SIZE[0] / 2.0) / 2.2) ** 2)
     pictures = np.where(opening, 10.0, sheet), np.where(opening, 0.0, stripe[None]) + 3.0
