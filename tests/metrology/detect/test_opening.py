@@ -33,10 +33,10 @@ def pictured(shape, turn_deg, *, shift=(0.0, 0.0), seed=3):
     """The opening on a textured sheet with dirt at its edge, and the stripe that it interrupts."""
     rng, turn = np.random.default_rng(seed), np.radians(turn_deg)
     matrix = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    points = shape @ matrix.T + np.array(SIZE) / 2.0 + shift
+    points = (shape - shape.mean(axis=0)) @ matrix.T + np.array(SIZE) / 2.0 + shift
     opening = cv2.fillPoly(np.zeros(SIZE[::-1], np.uint8), [np.rint(points).astype(np.int32)], 1)
     sheet = 120.0 + 8.0 * cv2.GaussianBlur(rng.normal(size=opening.shape), (0, 0), 2.0) / 0.14
-    for place in points[::80]:
+    for place in points[::60]:
         cv2.circle(sheet, tuple(int(c) for c in place), 4, 40.0, -1)
     stripe = 160.0 * np.exp(-0.5 * ((np.arange(SIZE[0]) - SIZE[0] / 2.0) / 2.2) ** 2)
     pictures = np.where(opening, 10.0, sheet), np.where(opening, 0.0, stripe[None]) + 3.0
@@ -55,7 +55,7 @@ def named(shape, turn_deg, **where):
     ("not_round", square(0.3)), ("half_occluded", covered(0.5)), ("half_occluded", covered(0.3)),
     (None, CIRCLE)])
 def test_the_outline_names_the_opening(reason, shape, turn_deg):
-    assert named(shape, turn_deg, shift=(20.0, 5.0)) == reason
+    assert named(shape, turn_deg, shift=(10.0, 5.0)) == reason
 
 
 def test_an_opening_at_the_border_is_cut_by_it():
