@@ -16,7 +16,7 @@ from sqlalchemy import Connection, select
 from cell.archive.logs import PICTURE
 from cell.core.documents.papers import Papers
 from cell.core.documents.record import HoleRecord, Start, Stop
-from cell.core.errors import DocumentError
+from cell.core.errors import CellError, DocumentError
 from cell.metrology.judge.decide import judge_run
 from cell.recording.integrity import COPIES
 from cell.recording.pages import read_pages, without_images
@@ -64,9 +64,13 @@ def _is_writable(logs: Path) -> bool:
 def count_unbooked(database: Database, logs: Path) -> int:
     """Count the recordings of a folder that have no row: those of `cell run`, until a rebuild."""
     with database.transaction() as connection:
-        known = {_original(log) for log in connection.execute(select(bodies.c.log)).scalars()}
-    here = {_original(log.name) for log in logs.glob("*.rrd") if not log.name.endswith(PICTURE)}
-    return len(here - known)
+        return len({_original(log.name) for log in _unbooked(connection, logs)})
+
+
+def _unbooked(connection: Connection, logs: Path) -> list[Path]:
+    known = {_original(log) for log in connection.execute(select(bodies.c.log)).scalars()}
+    return [log for log in sorted(logs.glob("*.rrd"))
+            if _original(log.name) not in known and not log.name.endswith(PICTURE)]
 
 
 def _original(log: str) -> str:
@@ -86,7 +90,7 @@ def rebuild(database: Database, logs: Path, watch: Callable[[int, int], None]) -
     for count, log in enumerate(files, start=1):
         try:
             rows = read_rows(log)
-        except DocumentError as error:
+        except CellError as error:
             troubles.append(str(error))
             continue
         with database.transaction() as connection:
@@ -97,13 +101,12 @@ def rebuild(database: Database, logs: Path, watch: Callable[[int, int], None]) -
 
 def book_missing(connection: Connection, logs: Path) -> None:
     """Book the recordings that a killed program had no time to book."""
-    known = set(connection.execute(select(bodies.c.log)).scalars())
-    for log in sorted(logs.glob("*.rrd")):
-        if log.name not in known:
-            try:
-                book(connection, read_rows(log))
-            except DocumentError:
-                continue  # `cell results rebuild` names it
+    for log in _unbooked(connection, logs):
+        try:
+            rows = read_rows(log)
+        except CellError:
+            continue  # `cell results rebuild` names it
+        book(connection, rows)
 
 
 def read_rows(log: Path) -> BodyRows:

@@ -165,7 +165,7 @@ def test_a_hole_that_the_cmm_knows_and_nobody_measured_ends_with_1(workplace, ca
 @pytest.mark.parametrize(("changes", "words"), [
     ({"body": "ANOTHER"}, "is of the body ANOTHER"),
     ({"set_id": "2026-10-01b"}, "is of the calibration set 2026-10-01b"),
-    ({"status": "interrupted"}, "was interrupted"),
+    ({"status": "interrupted"}, "ended: interrupted"),
     ({"recording_id": "m0"}, "the same run stands twice"),
 ])
 def test_what_does_not_belong_is_refused(workplace, masters, changes, words):
