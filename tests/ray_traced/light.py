@@ -59,14 +59,16 @@ class Fan:
                    self.offset + float(self.normal @ origin), self.thickness, self.opening)
 
     def intensity(self, points):
-        """Give the light (n,) that reaches points (n, 3) that face it."""
+        """Give the light (n,) at points (n, 3), as the strength of a lamp at the source.
+
+        A lamp's light falls off by the square of the distance, a fan's by the distance.
+        """
         apart = (points @ self.normal + self.offset) / self.thickness
         towards = points - self.source
-        distance = np.linalg.norm(towards, axis=1)
+        distance = np.sqrt(_dot(towards, towards))
         side = np.cross(self.normal, self.aim)
         angle = np.arctan2(towards @ side, towards @ self.aim)
-        return (np.exp(-0.5 * apart * apart - (angle / self.opening) ** 4)
-                * (FAR / distance))
+        return np.exp(-0.5 * apart * apart - (angle / self.opening) ** 4) * (distance / FAR)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,21 +86,22 @@ def send_back(points, normals, source, eye, lobe):
     The gloss is Ward's anisotropic lobe. Light falls off by the square of the distance.
     """
     lamp, camera = source - points, eye - points
-    far = np.linalg.norm(lamp, axis=1)
-    lamp, camera = lamp / far[:, None], camera / np.linalg.norm(camera, axis=1)[:, None]
-    facing = np.einsum("ij,ij->i", lamp, normals)
-    seen = np.einsum("ij,ij->i", camera, normals)
+    far = np.sqrt(_dot(lamp, lamp))
+    lamp, camera = lamp / far[:, None], camera / np.sqrt(_dot(camera, camera))[:, None]
+    facing, seen = _dot(lamp, normals), _dot(camera, normals)
     strength = np.where((facing > 0.0) & (seen > 0.0), (FAR / far) ** 2, 0.0)
-    matt = strength * np.maximum(facing, 0.0) / np.pi
+    facing, seen = np.maximum(facing, 0.0), np.maximum(seen, 1e-3)
     half = lamp + camera
-    upright = np.einsum("ij,ij->i", half, normals)
+    upright = np.maximum(_dot(half, normals), 1e-9)
     along = half @ lobe.groove - upright * (normals @ lobe.groove)
-    flat = np.einsum("ij,ij->i", half, half) - upright * upright - along * along
-    spread = (along / lobe.along) ** 2 + np.maximum(flat, 0.0) / lobe.across ** 2
-    lobe_height = np.exp(-spread / np.maximum(upright, 1e-9) ** 2)
-    gloss = (strength * lobe_height / (4.0 * np.pi * lobe.along * lobe.across)
-             * np.sqrt(np.maximum(facing, 0.0) / np.maximum(seen, 1e-3)))
-    return matt, gloss
+    across = np.maximum(_dot(half, half) - upright * upright - along * along, 0.0)
+    spread = (along / lobe.along) ** 2 + across / lobe.across ** 2
+    height = np.exp(-spread / upright ** 2) / (4.0 * np.pi * lobe.along * lobe.across)
+    return strength * facing / np.pi, strength * height * np.sqrt(facing / seen)
+
+
+def _dot(a, b):
+    return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
 
 
 def sky_share(points, sheets):

@@ -9,7 +9,7 @@ from ray_traced.picture import look
 from ray_traced.plate import FACE
 from ray_traced.sensor import Sensor
 
-NORMAL_OFF = np.radians(0.35)  # of a plan, per axis
+NORMAL_OFF = np.radians(0.3)   # of a plan, per axis; at most twice that
 RADIUS_OFF = 0.05              # mm, at most
 
 

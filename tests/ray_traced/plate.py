@@ -12,7 +12,7 @@ from ray_traced.shapes import distance_to_nearest
 
 VOID, FACE, RIM, WALL = range(4)
 LEVELS = 14      # that a ray is asked at on its way past a rim
-HALVINGS = 40    # of a stretch of mm: to rounding
+HALVINGS = 24    # of a stretch of a mm or two: to 1e-7 mm
 HAIR = 1e-6      # mm, for differences
 
 

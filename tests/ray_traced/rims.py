@@ -5,8 +5,12 @@ sheet's face (above it: negative), at a distance from the bore's wall, mm, and a
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+
+ANGLES = np.linspace(-np.pi, np.pi, 8193)  # at which a rim is known; straight in between
+LEAST = 0.15                               # of the mean
 
 
 @dataclass(frozen=True)
@@ -17,11 +21,16 @@ class Round:
     waves: tuple = ()  # of (order, amplitude, phase)
     most: float = np.inf
 
-    def at(self, angle):
-        value = np.ones_like(angle)
+    @cached_property
+    def _table(self):
+        value = np.ones_like(ANGLES)
         for order, amplitude, phase in self.waves:
-            value = value + amplitude * np.cos(order * angle + phase)
-        return np.clip(self.mean * value, 0.15 * self.mean, self.most)
+            value += amplitude * np.cos(order * ANGLES + phase)
+        return np.clip(self.mean * value, LEAST * self.mean, self.most)
+
+    def at(self, angle):
+        """Give the quantity at angles (n,) between -pi and pi."""
+        return np.interp(angle, ANGLES, self._table)
 
 
 @dataclass(frozen=True)

@@ -29,8 +29,7 @@ class Shading:
         sheet = self.scene.sheets[number]
         p = rays[mine].at(sheet.front)
         rng = np.random.default_rng([self.scene.seed, number])
-        skin = make_skin(rng, sheet.skin.finish, p.min(axis=0) - 0.2,
-                         p.max(axis=0) + 0.2)
+        skin = make_skin(rng, sheet.skin.finish, p.min(axis=0) - 0.2, p.max(axis=0) + 0.2)
         mark(rng, skin, sheet.skin.marks)
         return Face(self, number, skin)
 
@@ -52,6 +51,8 @@ class Shading:
         which, kinds, depths = hits
         light = np.zeros((len(kinds), 3))
         for number, face in enumerate(self.faces):
+            if face is None:  # too little of it to be met by a first ray
+                continue
             flat = np.flatnonzero((which == number) & (kinds == FACE))
             if len(flat):
                 light[flat] = face.shade_flat(rays[flat].at(face.sheet.front))

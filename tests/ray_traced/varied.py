@@ -12,7 +12,8 @@ def vary(pair, seed):
     """Vary a pair as a seed says."""
     rng = np.random.default_rng([seed, 5])
     left_right, top_bottom = (bool(side) for side in rng.integers(0, 2, 2))
-    chain = {"gain": round(rng.uniform(0.8, 1.2), 3), "gamma": round(rng.uniform(0.8, 1.25), 3),
+    most = 1.0 if "clipped" in pair.truth["tags"] else 1.2  # what is clipped is not clipped more
+    chain = {"gain": round(rng.uniform(0.8, most), 3), "gamma": round(rng.uniform(0.8, 1.25), 3),
              "flip_x": left_right, "flip_y": top_bottom,
              "jpeg": int(rng.integers(90, 101)) if rng.random() < 0.5 else None}
     sensor = pair.sensor.mirrored(left_right, top_bottom)
