@@ -3,7 +3,7 @@
 The two-step method looks at the chord's midpoint and the ellipse's centre, which a tilt displaces
 by tenths of a millimetre. Here all points take part, a circle in space is projected exactly (so
 that there is no eccentricity to correct), and the tilt comes from where it can be had: across the
-stripe from the plan and a little from the rim, along the stripe from the stripe itself. Two form
+stripe from the plan and a little from the rim, along the stripe from the stripe itself. Form
 unknowns keep an oval punch from being read as a tilt.
 """
 
@@ -20,7 +20,7 @@ from cell.core.optics import SensorModel
 from cell.metrology.features import Expected, Rim, Stripe
 from cell.metrology.locate.conic import circle_centre_ray
 from cell.metrology.locate.joint_problem import Prior, Problem
-from cell.metrology.locate.joint_rows import Circle, Sight, StripeSight
+from cell.metrology.locate.joint_rows import CRESTS, Circle, Sight, StripeSight
 from cell.metrology.locate.posterior import Posterior, solve_all
 from cell.metrology.locate.trace import trace_circle
 from cell.metrology.locate.uncertainty import FORM_SIGMA, joint_budget, one_sided, shares, total
@@ -84,9 +84,8 @@ def _start(rim: Sight, stripes: Sequence[StripeSight], expected: Expected) -> Ci
     plane = Plane.through(on_sheet, normal)
     centre = plane.meet(circle_centre_ray(rim.conic, normal))
     radius = float(np.linalg.norm(plane.meet(rim.rays) - centre, axis=1).mean())
-    none = np.zeros(2)
-    return Circle(centre, normal, _tangents(normal, stripes[0]), none, radius, none,
-                  np.zeros(len(stripes)))
+    return Circle(centre, normal, _tangents(normal, stripes[0]), np.zeros(2), radius,
+                  np.zeros(2 * len(CRESTS)), np.zeros(len(stripes)))
 
 
 def _tangents(normal: Array, stripe: StripeSight) -> Array:

@@ -33,7 +33,7 @@ HUBER = 3.0  # single points beyond so many sigma lose weight
 @dataclass(frozen=True, eq=False)
 class Prior:
     """What is known before looking: standard deviations of the normal's turns (2,) in rad about
-    `turn` (2,), of the form's two waves in mm, and of the radius in mm about `radius`.
+    `turn` (2,), of the form's waves in mm, and of the radius in mm about `radius`.
     """
 
     turn: Array
@@ -78,7 +78,7 @@ class Problem:
         """Set up what was known before of a circle."""
         unknowns, prior = np.eye(SHIFTS + len(self.stripes)), self.prior
         shift_sigma = np.array([stripe.shift_sigma for stripe in self.stripes])
-        waves = np.full(2, prior.form_sigma)
+        waves = np.full(circle.form.shape, prior.form_sigma)
         return [
             _known("normal_prior", circle.turn - prior.turn, unknowns[NORMAL], prior.normal_sigma),
             _known("form", circle.form, unknowns[FORM], waves),

@@ -8,8 +8,11 @@ wrong intrinsics and a shifted stripe all enter in the same way. Unknowns, in th
 | 0-2 | centre of the circle, camera frame | mm |
 | 3-4 | turn of its normal along `Circle.tangents` | rad |
 | 5 | radius | mm |
-| 6-7 | form: what cos 2t and sin 2t add to the radius (an oval punch is no tilt) | mm |
-| 8... | shift that all points of one stripe share | px |
+| 6-11 | form: what cos and sin of 2t, 3t and 4t add to the radius | mm |
+| 12... | shift that all points of one stripe share | px |
+
+The form keeps an oval punch from being read as a tilt, and waves of three and four crests from
+being read as the perspective of one.
 """
 
 from __future__ import annotations
@@ -25,7 +28,8 @@ from cell.metrology.features import Rim, Stripe
 from cell.metrology.locate.conic import fit_conic
 
 SMALLEST_BIAS = 1e-4  # px: a prior needs a width
-CENTRE, NORMAL, RADIUS, FORM, SHIFTS = slice(0, 3), slice(3, 5), 5, slice(6, 8), 8
+CRESTS = np.array([2, 3, 4])  # of the waves round a rim that its form may have
+CENTRE, NORMAL, RADIUS, FORM, SHIFTS = slice(0, 3), slice(3, 5), 5, slice(6, 12), 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +131,7 @@ class StripeSight:
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Residuals (n,) in px, their Jacobian (n, 8 + stripes), the direction (n, 2) in the image
+    """Residuals (n,) in px, their Jacobian (n, 12 + stripes), the direction (n, 2) in the image
     along which each is measured, at which `normalised` coordinates (n, 2); `by_plane` (n, 4)
     differentiates by the light plane's normal and offset.
     """
@@ -149,8 +153,7 @@ def rim_rows(circle: Circle, sight: Sight) -> Rows:
     spokes = sight.rays * reach[:, None] - circle.centre
     length = np.linalg.norm(spokes, axis=1)
     outward = spokes / length[:, None]
-    cosine, sine = circle.tangents @ outward.T
-    waves = np.stack([cosine**2 - sine**2, 2.0 * cosine * sine], axis=1)
+    waves = _waves(*circle.tangents @ outward.T)
     wanted = circle.radius + waves @ circle.form
     on_circle = circle.centre + outward * wanted[:, None]
     along = np.einsum("ni,ni->n", outward, on_circle) / (on_circle @ n)
@@ -162,6 +165,12 @@ def rim_rows(circle: Circle, sight: Sight) -> Rows:
     jacobian[:, FORM] = -waves
     return Rows((length - wanted) / scale, jacobian / scale[:, None], toward, sight.rays[:, :2],
                 np.zeros((len(spokes), 4)))
+
+
+def _waves(cosine: Array, sine: Array) -> Array:
+    """Give cos and sin of 2t, 3t and 4t (n, 6) from those of t (n,)."""
+    turned = (cosine + 1j * sine)[:, None] ** CRESTS
+    return np.asarray(np.concatenate([turned.real, turned.imag], axis=1))
 
 
 def stripe_rows(circle: Circle, stripe: StripeSight, index: int) -> Rows:

@@ -63,13 +63,13 @@ def test_derivatives_are_those_of_the_residuals():
     crossing = StripeSight.of(stripe, SENSOR_B, pose)
     tangents = np.linalg.svd(hole.normal[None])[2][1:]
     circle = Circle(hole.centre, hole.normal, tangents, np.array([1e-4, -1e-4]), 5.0001,
-                    np.array([1e-4, 2e-4]), np.array([0.01]))
+                    1e-4 * np.arange(1.0, 7.0), np.array([0.01]))
     far = Circle(pose @ hole.centre, pose.turn(hole.normal), pose.turn(tangents), np.zeros(2),
-                 5.0, np.zeros(2), np.array([0.01]))
+                 5.0, np.zeros(6), np.array([0.01]))
     for rows, at in ((lambda c: rim_rows(c, sight), circle),
                      (lambda c: stripe_rows(c, crossing, 0), far)):
         found = rows(at).jacobian
-        for unknown, step in enumerate(1e-6 * np.eye(9)):
+        for unknown, step in enumerate(1e-6 * np.eye(13)):
             change = rows(at.moved(step)).residual - rows(at.moved(-step)).residual
             assert found[:, unknown] == pytest.approx(change / 2e-6, rel=2e-3, abs=2e-2)
 
@@ -84,6 +84,22 @@ def test_noise_does_not_pull_the_tilt():
         rim, stripe = make_pair(hole, SENSOR_B, Noise(0.05, 0.2), rng)
         turns.append(locate_joint(rim, [(stripe, SAME)], SENSOR_B, plan).normal[:2])
     assert np.abs(np.mean(turns, axis=0)).max() < np.radians(0.02)
+
+
+@pytest.mark.parametrize("crests", [2, 3, 4])
+def test_a_wave_of_the_rim_is_no_tilt(crests):
+    """Nothing is known of the normal; the noise is far below the wave."""
+    rng = np.random.default_rng(8)
+    hole = TrueHole(np.array([2.0, 1.0, 252.0]), tilted(3.0, -2.0), 6.0)
+    rim, stripe = make_pair(hole, SENSOR_B, Noise(0.01, 0.05), rng)
+    outward = rim.points - rim.points.mean(axis=0)
+    turn = np.arctan2(*outward.T[::-1])
+    wavy = replace(rim, points=rim.points
+                   - 0.05 * np.cos(crests * turn + 0.7)[:, None] * rim.directions)
+    for seen in (rim, wavy):
+        found = locate_joint(seen, [(stripe, SAME)], SENSOR_B, Expected())
+        off = np.append(found.centre - hole.centre, found.radius - hole.radius)
+        assert np.all(np.abs(off) < 3.0 * np.sqrt(np.diag(found.covariance)))
 
 
 @pytest.mark.parametrize("radius", [3.0, 8.0])
