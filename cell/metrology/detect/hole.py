@@ -43,9 +43,9 @@ INWARD = 3.0           # px of hole beyond the wall
 MANY = 0.87            # profiles an edge, below which two rims may show
 NOTICED = 0.7          # px of wall, below which its brightness makes no difference
 ROUGH_SPACING, SPACING = 3.0, 1.5  # px along the rim
-SHARP = 1.0            # px of blur, above which an edge may be rounded where nobody knows the lens
-ALIKE = 1.08           # times the lens's blur: a sharp rim on any surface
-SOFT_DOUBT, SOFTEST = 6.0, 1.5  # px of ambiguity by each px beyond, and at most
+SHARP, SOFT_DOUBT = 1.0, 6.0  # px of an unknown lens's blur; px of ambiguity by each px beyond
+ALIKE, ROUND_DOUBT = 1.05, 20.0  # times a known lens's blur, and the same
+SOFTEST = 1.5          # px of ambiguity by softness, at most
 LIT_DOUBT, DARK_DOUBT = 0.4, 0.2  # of what a wall draws an edge by: a dark one is like another
 WAVES = np.arange(3, 5)  # crests round a rim: the form of punched and drilled holes
 SMALL_ROUGHNESS = 0.25  # px from end to end, which texture alone gives
@@ -159,7 +159,8 @@ def _ambiguity(band: Band, edge: Array, rays: Indices, profile: Profile,
     """
     low, high = np.quantile((edge - profile.edge)[rays], [0.025, 0.975])
     softness = np.sqrt(max(profile.blur**2 - SMOOTHING**2, 0.0))
-    rounded = SOFT_DOUBT * (softness - (SHARP if lens is None else ALIKE * lens))
+    rounded = (SOFT_DOUBT * (softness - SHARP) if lens is None
+               else ROUND_DOUBT * (softness - ALIKE * lens))
     uneven = uneven_blur(band[rays], replace(profile, edge=edge)[rays])
     ragged = max(high - low - SMALL_ROUGHNESS, LIP * np.sqrt(max(uneven - EVEN, 0.0)))
     white = CLIPPED_DOUBT * float(clipped(band.grey[rays]).mean())
