@@ -1,7 +1,9 @@
 """Pictures of the demo cell's board, from poses that the test knows."""
 
+from dataclasses import replace
+
 import numpy as np
-from made_scenes import demo_scene, demo_world
+from made_scenes import camera_over, demo_scene, demo_world, plate
 from scipy.spatial.transform import Rotation
 
 from cell.core.geometry import Transform
@@ -30,8 +32,22 @@ def random_pose(rng, lean_deg=32.0, roll_deg=90.0):
                                 middle + aside - turn.apply(BOARD_DESIGN.middle))
 
 
-def picture(camera_from_board, rng, *, laser=False):
+def picture(camera_from_board, rng, *, laser=False, lens=LENS, setting=SETTING, exposure=0.008):
     """Expose once under the ring light, or with the laser."""
-    lamps = Lamps(TRUTH, not laser, laser, int(rng.integers(1 << 30)))
-    return render(LENS, SETTING, BASE_FROM_BOARD @ camera_from_board.inverse, lamps,
-                  0.004 if laser else 0.008, rng)
+    lamps = Lamps(lens.sensor, not laser, laser, int(rng.integers(1 << 30)))
+    return render(lens, setting, BASE_FROM_BOARD @ camera_from_board.inverse, lamps,
+                  0.004 if laser else exposure, rng)
+
+
+def lens_with(**design):
+    """The demo's lens and chip, some of it otherwise: `blur_px`, `read_noise`."""
+    return Lens(replace(TRUTH, design=TRUTH.design.model_copy(update=design)))
+
+
+def sharp_rim(lens, rng, radius=5.0):
+    """A picture of a hole with a sharp rim, at the working distance."""
+    at, tilt = rng.uniform(-0.5, 0.5, 2), rng.uniform(-4.0, 4.0, 2)
+    lamps = Lamps(lens.sensor, True, False, int(rng.integers(1 << 30)))
+    return render(lens, Setting(Transform.identity(), plate(radius)),
+                  camera_over(*at, distance=lens.working_distance, tilt_deg=tilt), lamps, 0.006,
+                  rng)

@@ -77,6 +77,8 @@ def camera(cell: str = CELL, plan: Path | None = PLAN, yes: bool = YES, resume: 
            as_json: bool = JSON) -> None:
     """Calibrate the camera alone, for a look: a set needs light plane and hand-eye too (`all`).
 
+    How soft it draws a sharp edge is measured as well: matrix, distortion, `blur`.
+
     Exit code: 0 accepted, 1 refused, 2 bad input or stopped, 3 device fault.
     """
     _run("camera", Asked(cell, plan, yes, resume, speed, folder, live, as_json))

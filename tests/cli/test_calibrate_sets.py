@@ -42,6 +42,20 @@ def test_diff_speaks_of_a_measured_point(cell, second):
     assert "0.2000" in cell("calibrate", "diff", FIRST, second)[1]
 
 
+@pytest.mark.parametrize(("blurs", "change"), [((1.0, 1.1), 10.0), ((1.0, 0.9), -10.0),
+                                               ((None, 1.1), None), ((1.0, None), None)])
+def test_diff_compares_the_softness_of_edges_where_both_sets_know_it(cell, second, blurs, change):
+    from pathlib import Path
+    for name, blur in zip((FIRST, second), blurs, strict=True):
+        file = Path("calibration") / "demo" / "sets" / name / "sensor.yaml"
+        document = yaml.safe_load(file.read_text()) | {"blur": blur}
+        file.write_text(yaml.safe_dump(document))
+    _, out, _ = cell("calibrate", "diff", FIRST, second, "--json")
+    assert json.loads(out)["changes"].get("blur_percent") == (change and pytest.approx(change))
+    shown = "softness of a sharp edge" in cell("calibrate", "diff", FIRST, second)[1]
+    assert shown == (change is not None)
+
+
 def test_a_set_of_another_robot_is_not_gone_back_to(cell, second):
     from pathlib import Path
     file = Path("calibration") / "demo" / "sets" / second / "hand_eye.yaml"

@@ -2,10 +2,12 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from made_boards import LENS, TRUTH, sharp_rim
 from made_operator import Scripted
 from made_scenes import demo_scene, demo_world
 
@@ -14,11 +16,16 @@ from cell.archive.files import read_text
 from cell.archive.sets import active_set, check_set, read_set
 from cell.core.documents.calibration import HandEyeDocument, SensorDocument
 from cell.core.documents.calibration_session import CalibrationPlan
-from cell.core.documents.text import parse
+from cell.core.documents.text import dump, parse
 from cell.core.errors import DocumentError
 from cell.core.geometry import Transform
+from cell.metrology.detect.band import SMOOTHING
+from cell.metrology.detect.hole import detect_hole
+from cell.metrology.features import Expected
 from cell.programs.calibration.belief import read_belief
 from cell.programs.calibration.check import CheckRequest, check_cell
+from cell.programs.calibration.last_set import with_last_set
+from cell.programs.calibration.make_set import sensor_document
 from cell.programs.calibration.session import Session
 from cell.programs.calibration.shown import Shown
 from cell.programs.calibration.solve import before_and_after, solve_session
@@ -121,7 +128,7 @@ def test_the_set_is_better_than_what_it_began_with(plant, finished):
     before, after = before_and_after(done.solution, read_belief(ROOT / "calibration", "demo"))
     assert np.median(after) < 0.6 * np.median(before)
     assert [gate.name for gate in done.solution.gates["last set"]] == [
-        "hand_eye", "light_plane", "focal"]
+        "hand_eye", "light_plane", "focal", "blur_percent"]
     assert [line.set for line in history(folder)] == ["2026-11-20a", done.set_id]
 
 
@@ -139,6 +146,41 @@ def test_the_set_is_whole_and_carries_its_evidence(plant, finished):
     assert document.robot.kinematics_checksum and document.covariance is not None
     sensor = parse(SensorDocument, read_text(home / "sensor.yaml"), "sensor")
     assert sensor.camera_covariance and sensor.light_plane_covariance
+
+
+def test_the_set_knows_how_soft_a_sharp_edge_is(plant, finished):
+    done, operator = finished
+    home = plant / "demo" / "sets" / done.set_id
+    blur = parse(SensorDocument, read_text(home / "sensor.yaml"), "sensor").blur
+    rng = np.random.default_rng(2)
+    rims = [detect_hole(sharp_rim(LENS, rng), TRUTH.camera, Expected(radius=5.0, thickness=1.0))
+            for _ in range(3)]
+    assert np.sqrt(np.array([rim.blur for rim in rims])**2 - SMOOTHING**2) == pytest.approx(
+        blur, rel=0.03)
+    gates = {gate.name: gate for gate in done.solution.gates["camera"]}
+    assert gates["blur_px"].value == blur and gates["blur_spread_percent"].value < 1.0
+    assert operator.heard(f"a sharp edge is {blur:.3f} px soft")
+    assert f"a sharp edge is {blur:.3f} px soft" in read_text(home / "report.html")
+
+
+def test_a_set_that_does_not_know_it_can_be_begun_with_and_made(finished):
+    solution, belief = finished[0].solution, read_belief(ROOT / "calibration", "demo")
+    before = replace(belief, sensor_document=belief.sensor_document.model_copy(
+        update={"blur": None}))
+    names = [gate.name for gate in with_last_set(solution, before, "fine").gates["last set"]]
+    assert names == ["hand_eye", "light_plane", "focal"]
+    assert sensor_document(solution, before).blur == solution.camera.blur > 0.0
+    unknown = replace(solution, camera=replace(solution.camera, blur=None))
+    assert "blur" not in dump(sensor_document(unknown, belief))
+    assert sensor_document(replace(unknown, camera_result=None), belief).blur == 0.99
+
+
+def test_a_lens_softer_than_it_was_has_to_be_explained(finished):
+    solution, belief = finished[0].solution, read_belief(ROOT / "calibration", "demo")
+    softer = replace(solution, camera=replace(solution.camera, blur=1.1))
+    gate = with_last_set(softer, belief, "fine").gates["last set"][-1]
+    assert gate.name == "blur_percent" and gate.verdict == "warn"
+    assert gate.value == pytest.approx(100.0 * (1.1 / 0.99 - 1.0))
 
 
 def test_held_out_views_were_not_fitted(finished):

@@ -23,8 +23,10 @@ SLANT = (float(np.sin(np.radians(1.0))), float(np.sin(np.radians(80.0))))  # of 
 class CameraDocument(Document):
     """A camera alone: image size (width, height) and matrix in px, distortion as OpenCV has it.
 
-    `blur` is optional: how soft a sharp edge appears, the standard deviation in px. With it, a rim
-    that is softer is known to be rounded or burred, and one that is not, to be sharp.
+    `blur` is optional: how soft a sharp edge appears at the working distance, the standard
+    deviation in px; lens, pixel and sampling together, as rims are measured and as the calibration
+    finds it on a board. With it, a rim that is softer is known to be rounded or burred, and one
+    that is not, to be sharp.
     """
 
     image_size: tuple[Pixels, Pixels]

@@ -16,6 +16,7 @@ import numpy as np
 from cell.core.errors import UnmeasurableError
 from cell.core.geometry import Array, Transform
 from cell.core.optics import CameraModel
+from cell.metrology.calibrate.board_blur import LensBlur
 from cell.metrology.calibrate.board_pose import BoardView, corner_sigma
 
 FEWEST_VIEWS, FEWEST_CORNERS = 4, 6
@@ -31,7 +32,8 @@ class CameraResult:
 
     `residuals` are the misses (n, 2) px of each view, `coverage` (8, 8) the corners seen in each
     cell of the image, `tilts` (rad) how far each board leaned, `split_half` the relative difference
-    of the focal length between even and odd views (NaN where a half is too small).
+    of the focal length between even and odd views (NaN where a half is too small). `blur`
+    is how soft it draws a sharp edge; None where only corners were given, or few edges were clear.
     """
 
     camera: CameraModel
@@ -40,11 +42,20 @@ class CameraResult:
     camera_from_board: tuple[Transform, ...]
     coverage: Array
     split_half: float
+    blur: LensBlur | None = None
 
     @property
     def rms_px(self) -> float:
         """The distance between seen and projected corners, root mean square."""
         return float(np.sqrt(np.mean(np.sum(np.concatenate(self.residuals) ** 2, axis=1))))
+
+    @property
+    def softness(self) -> str:
+        """How soft a sharp edge appears, in words."""
+        if self.blur is None:
+            return ("how soft a sharp edge appears is not known: too few clear edges between black "
+                    "and white squares; a soft lens and a rounded rim will look alike")
+        return str(self.blur)
 
     @property
     def tilts(self) -> Array:

@@ -58,10 +58,13 @@ def _with_spare(gates: Mapping[str, Gate]) -> dict[str, Gate]:
 
 def camera_figures(result: CameraResult) -> dict[str, float]:
     """What the gates of the camera look at."""
-    return {"rms_px": result.rms_px, "views": len(result.residuals),
-            "tilted_views": int(np.sum(result.tilts > TILTED)),
-            "covered_percent": 100.0 * result.covered,
-            "split_half_percent": 100.0 * result.split_half}
+    blur = result.blur
+    figures = {} if blur is None else {"blur_px": blur.value,
+                                       "blur_spread_percent": 100.0 * blur.spread / blur.value}
+    return figures | {"rms_px": result.rms_px, "views": len(result.residuals),
+                      "tilted_views": int(np.sum(result.tilts > TILTED)),
+                      "covered_percent": 100.0 * result.covered,
+                      "split_half_percent": 100.0 * result.split_half}
 
 
 def plane_figures(result: LightPlaneResult) -> dict[str, float]:

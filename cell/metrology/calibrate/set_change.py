@@ -42,6 +42,14 @@ def changes(before: Calibrated, now: Calibrated) -> dict[str, float]:
     return {name: change for name, change in found.items() if change is not None}
 
 
+def softened(before: Calibrated, now: Calibrated) -> float | None:
+    """Say by how much of itself the softness of a sharp edge has grown; None where one set does not
+    know it.
+    """
+    blur, other = before.sensor.camera.blur, now.sensor.camera.blur
+    return None if blur is None or other is None else other / blur - 1.0
+
+
 def _mount(before: Calibrated, now: Calibrated) -> float | None:
     one, other = before.flange_from_camera, now.flange_from_camera
     covariance = _sum(before.covariance, now.covariance)

@@ -78,18 +78,28 @@ def smooth_around(image: Image, ellipse: Ellipse, margin: float) -> Patch:
     size = np.array(image.shape[::-1])
     first = np.clip(ellipse.centre - reach, 0, size - 1).astype(int)
     last = np.clip(ellipse.centre + reach, first + 1, size).astype(int)
-    part = image[first[1]:last[1], first[0]:last[0]].astype(np.float32)
-    return Patch(cv2.GaussianBlur(part, (0, 0), SMOOTHING), first.astype(np.float64))
+    return smooth(image[first[1]:last[1], first[0]:last[0]], first.astype(np.float64))
+
+
+def smooth(part: Image, origin: Array) -> Patch:
+    """Smooth a part of an image whose first pixel is the pixel `origin` (x, y) of it."""
+    return Patch(cv2.GaussianBlur(part.astype(np.float32), (0, 0), SMOOTHING), origin)
 
 
 def sample_band(patch: Patch, ellipse: Ellipse, offsets: Array, rays: int) -> Band:
-    """Sample a patch at `offsets` (m,) px along the outward normals of an ellipse.
+    """Sample a patch at `offsets` (m,) px along the outward normals of an ellipse."""
+    t = np.linspace(0.0, 2.0 * np.pi, rays, endpoint=False)
+    return Band(ellipse, t, offsets,
+                sample_profiles(patch, ellipse.points(t), ellipse.normals(t), offsets))
+
+
+def sample_profiles(patch: Patch, feet: Array, normals: Array, offsets: Array) -> Array:
+    """Sample a patch at `offsets` (m,) px along unit normals (n, 2) from feet (n, 2) px: (n, m).
 
     Bilinear; beyond the patch the grey of its border goes on.
     """
-    t = np.linspace(0.0, 2.0 * np.pi, rays, endpoint=False)
-    feet, normals = ellipse.points(t) - patch.origin, ellipse.normals(t)
+    feet = feet - patch.origin
     x, y = ((feet[:, axis, None] + normals[:, axis, None] * offsets).astype(np.float32)
             for axis in (0, 1))
     grey = cv2.remap(patch.grey, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return Band(ellipse, t, offsets, grey.astype(np.float64))
+    return grey.astype(np.float64)

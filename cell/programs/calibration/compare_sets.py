@@ -12,7 +12,7 @@ from cell.core.documents.calibration import HandEyeDocument, SensorDocument
 from cell.core.documents.text import parse
 from cell.core.geometry import Transform
 from cell.core.optics import SensorModel
-from cell.metrology.calibrate.set_change import Calibrated, changes
+from cell.metrology.calibrate.set_change import Calibrated, changes, softened
 
 MEANT = {"hand_eye": "the hand-eye", "light_plane": "the light plane", "focal": "the focal length"}
 
@@ -35,6 +35,7 @@ def compare_sets(folder: Path, first: str, second: str) -> tuple[Change, ...]:
     """
     before, now = (_read(folder, name) for name in (first, second))
     return (*_compare(before.sensor, before.flange_from_camera, now.sensor, now.flange_from_camera),
+            *_softened(before, now),
             *(Change(f"{name}_times", f"{MEANT[name]}, over what both uncertainties explain", times,
                      "times") for name, times in changes(before, now).items()))
 
@@ -58,6 +59,12 @@ def _compare(sensor: SensorModel, mount: Transform, other_sensor: SensorModel,
         Change("working_distance_mm", "working distance",
                other_sensor.working_distance - sensor.working_distance, "mm"),
     )
+
+
+def _softened(before: Calibrated, now: Calibrated) -> tuple[Change, ...]:
+    softer = softened(before, now)
+    return () if softer is None else (
+        Change("blur_percent", "softness of a sharp edge", 100.0 * softer, "%"),)
 
 
 def _point_shift(sensor: SensorModel, mount: Transform, other: SensorModel,

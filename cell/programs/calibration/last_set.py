@@ -9,7 +9,7 @@ import numpy as np
 from cell.core.geometry import Array
 from cell.core.optics import SensorModel
 from cell.metrology.calibrate.gates import Level, check_gates
-from cell.metrology.calibrate.set_change import Calibrated, changes
+from cell.metrology.calibrate.set_change import Calibrated, changes, softened
 from cell.programs.calibration.belief import Belief
 from cell.programs.calibration.recorded import read_gates
 from cell.programs.calibration.solve import Solution, chain_of
@@ -17,8 +17,11 @@ from cell.programs.calibration.solve import Solution, chain_of
 
 def with_last_set(solution: Solution, belief: Belief, level: Level) -> Solution:
     """Add the gates against the active set: more than both uncertainties has to be explained."""
-    checks = check_gates(changes(_before(belief), _now(solution, belief)),
-                         read_gates().level(level).last_set)
+    before, now = _before(belief), _now(solution, belief)
+    softer = softened(before, now)
+    figures = changes(before, now) | (
+        {} if softer is None else {"blur_percent": 100.0 * abs(softer)})
+    checks = check_gates(figures, read_gates().level(level).last_set)
     return replace(solution, gates=solution.gates | ({"last set": checks} if checks else {}))
 
 

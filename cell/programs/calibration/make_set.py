@@ -77,7 +77,8 @@ def sensor_document(solution: Solution, belief: Belief) -> SensorDocument:
     if solution.camera_result is not None:
         camera = solution.camera
         changes |= {"camera_matrix": _rows(camera.matrix), "distortion": _row(camera.distortion),
-                    "camera_covariance": _rows(solution.camera_result.covariance)}
+                    "camera_covariance": _rows(solution.camera_result.covariance),
+                    "blur": camera.blur}
     if solution.light_plane is not None:
         plane = solution.light_plane.plane
         changes |= {"light_plane": (*_row(plane.normal), plane.offset),

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from cell.core.documents.calibration_session import ViewRecord
 from cell.core.documents.targets import BoardDocument
 from cell.core.errors import UnmeasurableError
 from cell.core.geometry import Array
 from cell.core.observation import Image
+from cell.metrology.calibrate.board_blur import SeenEdges, find_edges
 from cell.metrology.calibrate.board_pose import BoardView
 from cell.metrology.calibrate.detect_board import detect_board
 from cell.metrology.calibrate.detect_board_stripe import detect_board_stripe
@@ -18,11 +19,14 @@ from cell.programs.calibration.session import Session
 
 @dataclass(frozen=True, eq=False)
 class SeenView:
-    """What a view shows: the board's corners, and the stripe (n, 2) px where one was found."""
+    """What a view shows: the board's corners, the stripe (n, 2) px where one was found, and the
+    edges between the board's squares.
+    """
 
     record: ViewRecord
     board: BoardView
     stripe: Array | None
+    edges: SeenEdges | None = None
 
 
 def see_view(record: ViewRecord, ring: Image, stripe: Image, belief: Belief,
@@ -32,12 +36,14 @@ def see_view(record: ViewRecord, ring: Image, stripe: Image, belief: Belief,
     Raises:
         UnmeasurableError: no board.
     """
-    board = detect_board(ring, design_of(document)).view
+    design = design_of(document)
+    board = detect_board(ring, design).view
+    seen = SeenView(record, board, None, find_edges(ring, board, design))
     try:
         points = detect_board_stripe(stripe, ring, belief.sensor.camera, upright=belief.upright)
     except UnmeasurableError:
-        return SeenView(record, board, None)
-    return SeenView(record, board, points)
+        return seen
+    return replace(seen, stripe=points)
 
 
 def see_again(record: ViewRecord, session: Session, belief: Belief) -> SeenView:

@@ -11,6 +11,7 @@ from cell.core.documents.calibration_session import Precondition
 from cell.core.errors import DocumentError, UnmeasurableError
 from cell.core.geometry import Array
 from cell.core.optics import CameraModel, SensorModel
+from cell.metrology.calibrate.board_blur import solve_lens_blur
 from cell.metrology.calibrate.board_pose import locate_boards
 from cell.metrology.calibrate.camera import CameraResult, solve_camera
 from cell.metrology.calibrate.gates import Checked, GateSet, Ruling, check_gates, worst
@@ -98,7 +99,7 @@ def _solve(seen: tuple[SeenView, ...], session: Session, belief: Belief,
     checks, camera_result, plane, answer = dict[str, tuple[Checked, ...]](), None, None, None
     camera = belief.sensor.camera
     if what in ("camera", "all"):
-        camera_result = solve_camera([view.board for view in fitted], camera.image_size, camera)
+        camera_result = _camera(fitted, belief.sensor)
         camera = camera_result.camera
         checks["camera"] = check_gates(camera_figures(camera_result), gates.camera)
     if what in ("light-plane", "all"):
@@ -132,6 +133,16 @@ def _with_sphere(solution: Solution, session: Session, belief: Belief,
         solution, belief), gates.sphere)
     return replace(solution, sphere=check.result,
                    gates=solution.gates | {"sphere": check.gates})
+
+
+def _camera(views: Sequence[SeenView], believed: SensorModel) -> CameraResult:
+    """Solve the camera, and how soft it draws a sharp edge at the working distance."""
+    result = solve_camera([view.board for view in views], believed.camera.image_size,
+                          believed.camera)
+    blur = solve_lens_blur([view.edges for view in views], result.camera_from_board,
+                           believed.working_distance)
+    return replace(result, blur=blur,
+                   camera=replace(result.camera, blur=None if blur is None else blur.value))
 
 
 def _plane(views: Sequence[SeenView], camera: CameraModel) -> LightPlaneResult:

@@ -106,6 +106,8 @@ def show(solution: Solution, operator: Operator) -> None:
         for gate in gates:
             operator.tell(f"  {gate.verdict:6} {gate.meaning}: {gate.value:.4g}, wanted "
                           f"{gate.limit}")
+    if solution.camera_result is not None:
+        operator.tell(solution.camera_result.softness)
     for reason in solution.reasons:
         operator.tell(f"- {reason}")
     if solution.hand_eye is not None and solution.hand_eye.limited_by:
