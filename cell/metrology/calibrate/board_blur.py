@@ -16,6 +16,7 @@ from itertools import combinations
 
 import cv2
 import numpy as np
+from scipy.special import ndtr
 
 from cell.core.geometry import Array, Transform
 from cell.core.observation import Image
@@ -23,7 +24,7 @@ from cell.metrology.arrays import Indices, Mask
 from cell.metrology.calibrate.board_pose import BoardView
 from cell.metrology.calibrate.detect_board import SATURATED, BoardDesign
 from cell.metrology.detect.band import SMOOTHING, sample_profiles, smooth, spread
-from cell.metrology.detect.profile import Comparison, Profile, compare, shape_step
+from cell.metrology.detect.profile import Comparison, bell, explain, fit_levels
 from cell.metrology.detect.profile_fit import NARROWEST, SETTLED, USUAL_BLUR, WIDEST
 from cell.metrology.spread import middle, robust_sigma, tukey_weights
 
@@ -213,17 +214,21 @@ def _fit_square(edges: SeenEdges) -> float | None:
         if abs(move) < SETTLED / 10.0:
             break
     seen = _against_step(grey, gap, places, blur)
-    return blur**2 - SMOOTHING**2 if middle(seen.height) > CLEAR * _scale(seen) else None
+    return blur**2 - SMOOTHING**2 if middle(seen.levels[:, 1]) > CLEAR * _scale(seen) else None
 
 
 def _against_step(grey: Array, gap: Array, places: Array, blur: float) -> Comparison:
     """Compare profiles (n, m) with black, white from `places` (n,) px on, and a marker's black
     `gap` (n,) px further: its blur reaches into the profile.
     """
-    none = np.zeros(len(grey))
-    up, down = (shape_step(OFFSETS, Profile(at, blur, none, none))[:, [0, 1, 4]]
-                for at in (places, places + gap))
-    return compare(grey, up - down)
+    near, far = ((OFFSETS - at[:, None]) / blur for at in (places, places + gap))
+    signals = np.empty((len(grey), 5, len(OFFSETS)))
+    signals[:, 2], signals[:, 3], signals[:, 4] = 1.0, ndtr(near) - ndtr(far), grey
+    levels = fit_levels(signals[:, 2:])
+    steep = levels[:, 1, None] / blur
+    signals[:, 0] = steep * (bell(far) - bell(near))
+    signals[:, 1] = steep * (bell(far) * far - bell(near) * near)
+    return explain(signals, levels)
 
 
 def _scale(seen: Comparison) -> float:

@@ -18,6 +18,7 @@ from cell.metrology.arrays import Grey, Indices
 from cell.metrology.detect.ellipse import Ellipse
 
 SMOOTHING = 0.8  # px, of the picture before edges are looked for
+SOFT = 4.0       # px to either side: what rises as evenly over so much is no edge of the sheet
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +47,12 @@ class Band:
     def slope(self) -> Array:
         """How the grey rises outward (n, m), per px."""
         return np.asarray(np.gradient(self.grey, self.step, axis=1))
+
+    @cached_property
+    def sharp(self) -> Array:
+        """How far the slope stands out of its surroundings (n, m), per px: shadows go out."""
+        width = 2 * round(SOFT / self.step) + 1
+        return self.slope - cv2.blur(self.slope, (width, 1), borderType=cv2.BORDER_REFLECT)
 
     @cached_property
     def normals(self) -> Array:

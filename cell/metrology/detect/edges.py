@@ -10,6 +10,8 @@ from cell.core.geometry import Array
 from cell.metrology.arrays import Indices, Mask
 from cell.metrology.detect.band import Band
 
+FAINTEST = {-1: 0.4, 0: 0.3, +1: 0.4}  # of the usual edge; before something lit it varies more
+
 
 @dataclass(frozen=True, eq=False)
 class Edges:
@@ -28,15 +30,21 @@ class Edges:
         return np.bincount(self.ray, minlength=count) > 0
 
 
+def rise(band: Band, inside: int) -> Array:
+    """Give how a band rises out of the hole (n, m), per px; where either sense will do, sharply."""
+    return -inside * band.slope if inside else np.abs(band.sharp)
+
+
 def find_edges(band: Band, inside: int, least: float) -> Edges:
     """Find every edge on every profile that rises by `least` grey/px out of the hole.
 
     Args:
         band: the profiles.
-        inside: -1 where the hole is darker than the metal (the grey rises outward), else +1.
+        inside: -1 where the hole is darker than the metal (the grey rises outward), +1 where it is
+            brighter; 0 where that may change round the rim, and only what is sharp is an edge.
         least: the smallest slope that counts.
     """
-    slope = -inside * band.slope
+    slope = rise(band, inside)
     middle, before, after = slope[:, 1:-1], slope[:, :-2], slope[:, 2:]
     ray, column = np.nonzero((middle > before) & (middle >= after) & (middle > least))
     peak, left, right = (part[ray, column] for part in (middle, before, after))

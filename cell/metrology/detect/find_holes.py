@@ -12,7 +12,7 @@ from cell.core.observation import Image
 from cell.core.optics import CameraModel
 from cell.metrology.arrays import Mask
 from cell.metrology.detect.band import Patch, sample_band, smooth_around, spread
-from cell.metrology.detect.edges import find_edges
+from cell.metrology.detect.edges import FAINTEST, find_edges
 from cell.metrology.detect.ellipse import Ellipse, project_circle
 from cell.metrology.detect.rim_fit import agree
 from cell.metrology.detect.voting import Circle, vote_for_circles
@@ -24,14 +24,16 @@ RAYS = 120
 MARGIN = 0.25           # of the radius, on either side of the rim, that is looked at
 LEAST_COVERAGE = 0.4    # of the rim, to be a hole at all
 FEW_VOTES = 0.1         # of those for a hole that was found, below which nobody looks
+LIT = 0.2               # glow, from which on what is behind may be as bright as the sheet
 EDGE_WIDTH = 2.5        # px over which the step of a sharp edge extends
 
 
 @dataclass(frozen=True, eq=False)
 class Hole:
     """A hole as the search knows it: a rough `ellipse`, `inside` (-1 darker, +1 brighter than the
-    metal), the share of its rim that was seen (`coverage`), the `contrast` there (grey/px), the
-    `glow` (the grey inside as a share of the metal's) and the `patch` of the image around it.
+    metal; 0 this here and that there, or a dark ring of wall before something as bright), the share
+    of its rim that was seen (`coverage`), the `contrast` there (grey/px), the `glow` (the grey
+    inside as a share of the metal's) and the `patch` of the image around it.
     """
 
     ellipse: Ellipse
@@ -40,6 +42,11 @@ class Hole:
     contrast: float
     glow: float
     patch: Patch
+
+    @property
+    def lit(self) -> bool:
+        """Whether it may be as bright behind as on the sheet, here and there."""
+        return self.inside == 0 or (self.inside < 0 and self.glow > LIT)
 
 
 def find_holes(image: Image, camera: CameraModel, expected: Expected) -> Iterator[Hole]:
@@ -85,12 +92,12 @@ def _octaves(camera: CameraModel, expected: Expected, size: int) -> list[Array]:
 
 def _look(image: Image, circle: Circle, expected: Expected, camera: CameraModel) -> Hole | None:
     """Look closer at a place that was voted for; None where it is no hole."""
-    start = _expected_ellipse(circle, camera, expected)
+    start = expected_ellipse(circle, camera, expected)
     patch = smooth_around(image, start, 2.0 * MARGIN * circle.radius)
     step = max(0.5, circle.radius / 60.0)
     band = sample_band(patch, start, spread(MARGIN * circle.radius, step), RAYS)
     steepest = middle((-circle.inside * band.slope).max(axis=1))
-    edges = find_edges(band, circle.inside, max(0.4 * steepest, 1e-3))
+    edges = find_edges(band, circle.inside, max(FAINTEST[circle.inside] * steepest, 1e-3))
     if len(edges.ray) < LEAST_COVERAGE * RAYS:
         return None
     ellipse, close = agree(band, edges, max(1.0, 0.02 * circle.radius),
@@ -114,7 +121,8 @@ def within(image: Image, ellipse: Ellipse, rays: int) -> Mask:
     return np.asarray(((rim >= 1.0) & (rim <= last)).all(axis=1))
 
 
-def _expected_ellipse(circle: Circle, camera: CameraModel, expected: Expected) -> Ellipse:
+def expected_ellipse(circle: Circle, camera: CameraModel, expected: Expected) -> Ellipse:
+    """Give a circle the shape that its expected normal makes it appear in."""
     if expected.normal is None:
         return Ellipse.circle(circle.x, circle.y, circle.radius)
     ray = camera.rays([circle.x, circle.y])

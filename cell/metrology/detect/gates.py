@@ -12,23 +12,25 @@ from cell.core.geometry import Array
 from cell.core.observation import Image
 from cell.metrology.arrays import Mask
 from cell.metrology.detect.band import Band, sample_band, spread
-from cell.metrology.detect.edges import find_edges
+from cell.metrology.detect.edges import FAINTEST, find_edges
 from cell.metrology.detect.ellipse import Ellipse
 from cell.metrology.detect.find_holes import MARGIN, RAYS, Hole, within
 from cell.metrology.detect.opening import LEAST_GAP, UNLIKE
 from cell.metrology.detect.ridge import Ridge
 from cell.metrology.reasons import Reason, refusal
-from cell.metrology.spread import quantile
+from cell.metrology.spread import middle, quantile
 
 COMPLETE = 0.75  # of the rim has to be seen
 DARK, WHITE = 20.0, 254  # grey values of 255
 MOSTLY = 0.5     # of the picture
-CLEAR = 20.0     # times what the profiles leave unexplained
+VAGUE = 0.25     # px, to which a profile has to tell the edge
 TOO_SOFT = 3.0   # px of blur
 FLATTEST = 0.75  # minor over major axis: a tilt of 41 degrees
 RAGGED = 0.03    # of the radius, that edges may scatter
 CLIPPED = 0.8    # of the rim's sheet is white: the edge lies where the light blooms
 FEWEST_RAYS = 0.25  # of the profiles round a rim have to fit
+HALF = 0.5       # of the profiles of a rim before something lit have to fit
+COVERED = 0.2    # of a rim, that metal inside it hides
 NEARBY = 0.5     # of the radius: where the rest of a rim lies that a small ellipse was fitted to
 BORDERING = 0.25  # of what is missing of a rim would lie beyond the image
 BESIDE = 0.1     # of the radius, inside and outside the rim, where hole and metal are looked at
@@ -52,7 +54,7 @@ def check_whole(image: Image, hole: Hole) -> None:
     radius = hole.ellipse.radius
     offsets = spread(MARGIN * radius, max(0.5, radius / 60.0))
     band = sample_band(hole.patch, hole.ellipse, offsets, RAYS)
-    edges = find_edges(band, hole.inside, 0.4 * hole.contrast)
+    edges = find_edges(band, hole.inside, FAINTEST[hole.inside] * hole.contrast)
     seen = edges[np.abs(edges.offset) < max(2.0, 0.03 * radius)].rays(RAYS)
     if seen[within(image, hole.ellipse, RAYS)].mean() < COMPLETE:
         if _reaches_border(image, hole, band)[~seen].mean() > BORDERING:
@@ -70,20 +72,38 @@ def _reaches_border(image: Image, hole: Hole, band: Band) -> Mask:
     return (np.abs(points - nearest).max(axis=1) > 1.0) & (border * hole.inside > 0.0)
 
 
-def check_clear(step: float, misfit: float, blur: float) -> None:
-    """Refuse a rim whose `step` is lost in what the profiles leave unexplained (`misfit`, both in
-    grey values), or that is too soft (`blur`, px).
+def check_clear(unsure: float, blur: float) -> None:
+    """Refuse a rim that its profiles tell too vaguely (`unsure`, px), for what they leave
+    unexplained is too high beside their steps, or that is too soft (`blur`, px).
     """
-    if step < CLEAR * misfit:
-        raise refusal("too_dark", f"the edge is {step:.1f} grey values high, the rest {misfit:.1f}")
     if blur > TOO_SOFT:
         raise refusal("blurred", f"the edge is {blur:.1f} px wide")
+    if unsure > VAGUE:
+        raise refusal("too_dark", f"a profile tells the edge to {unsure:.1f} px")
 
 
-def check_settled(good: Mask) -> None:
-    """Refuse a rim that hardly any of its profiles (n,) fit."""
-    if good.mean() < FEWEST_RAYS:
-        raise refusal("not_round", f"{good.mean():.0%} of the profiles across its edge fit")
+def check_settled(good: Mask, *, lit: bool) -> None:
+    """Refuse a rim that too few of its profiles (n,) fit: hardly any of them, or before something
+    lit, which another ellipse may cross, not half of them.
+    """
+    if good.mean() < (HALF if lit else FEWEST_RAYS):
+        raise refusal("too_dark" if lit else "not_round",
+                      f"{good.mean():.0%} of the profiles across its edge fit")
+
+
+def check_uncovered(hole: Hole, ellipse: Ellipse, sure: Mask) -> None:
+    """Refuse an ellipse that metal lies within where its edge is not `sure` (n,), though elsewhere
+    inside and outside are not alike.
+    """
+    radius = ellipse.radius
+    band = sample_band(hole.patch, ellipse, spread(MARGIN * radius, 1.0), len(sure))
+    near = band.grey[:, np.abs(band.offsets / radius + BESIDE / 2.0) < BESIDE / 4.0].mean(axis=1)
+    inner, outer = band.levels(BESIDE * radius)
+    usual = middle(np.abs(outer - near)[sure])
+    alike = np.maximum(np.abs(outer - near), np.abs(outer - inner)) < usual / 2.0
+    covered = float((~sure & alike).mean())
+    if usual > UNLIKE * max(middle(near[sure]), middle(outer[sure])) and covered > COVERED:
+        raise refusal("half_occluded", f"metal covers {covered:.0%} of the rim")
 
 
 def check_unclipped(grey: Array) -> None:

@@ -1,13 +1,16 @@
-"""The grey profile across a rim: hole, wall of the bore, sheet.
+"""The grey profile across a rim: what lies behind, wall of the bore, sheet.
 
-Along each ray the grey is  h + g S(d)  with  S = (1 - k) F((d - e) / s) + k F((d - e + w) / s) :
-F is the normal distribution, e where the sheet ends, w how wide the wall shows, k the share of the
-step g that the wall takes (negative where the wall is darker than what lies behind), s the blur.
+Along each ray the grey is  h (1 - F(far)) + p (F(near) + k (F(far) - F(near)))  with
+near = (d - e) / s  and  far = (d - e + w) / s :  F is the normal distribution, h the grey behind
+the hole, p the sheet's, k the wall's as a share of the sheet's, e where the sheet ends, w how wide
+the wall shows, s the blur. Behind may be as bright as the sheet: the wall is then a dark ring
+between the two, and the only edge there is. The sheet throws a soft shadow on what is lit behind
+it, so that h may fall toward the rim: h + h' d.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import ndtr
@@ -19,82 +22,99 @@ from cell.metrology.arrays import Indices
 @dataclass(frozen=True, eq=False)
 class Profile:
     """What the profiles of a rim share: the `blur` px; and on each ray where the sheet ends
-    (`edge`, (n,) px along the normal), how wide the wall shows (`width`) and its `share`.
+    (`edge`, (n,) px along the normal), how wide the wall shows (`width`) and its `shade`: its grey
+    as a share of the sheet's; or, before a `backlight` that is much brighter than the sheet, how
+    much of the light it takes: its grey between the sheet's (0) and the light's (1). `sloped` lets
+    the grey behind change along a ray, as the shadow of the sheet on something lit does.
     """
 
     edge: Array
     blur: float
     width: Array
-    share: Array
+    shade: Array
+    sloped: bool = False
+    backlight: bool = False
 
     def __getitem__(self, rays: Indices) -> Profile:
         """Return some of the rays."""
-        return Profile(self.edge[rays], self.blur, self.width[rays], self.share[rays])
-
-    @property
-    def wall_pull(self) -> Array:
-        """How far (n,) px the wall draws an edge that is thought to have two levels only."""
-        return self.share * np.maximum(self.width, 0.0)
+        return replace(self, edge=self.edge[rays], width=self.width[rays], shade=self.shade[rays])
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What grey profiles say of a step once two levels of each ray are fitted: the `height` of the
-    step (n,), the `misfit` (n,) that remains (rms), both in grey values; and with the slopes of the
-    step, what the two levels can explain taken out of them, their `products` (n, p, p) with each
-    other and their `pulls` (n, p): products with what remains.
+    """What grey profiles say once the two levels of each ray are fitted: the `levels` behind and on
+    the sheet (n, 2), the `misfit` (n,) that remains (rms), all in grey values; and with the slopes
+    of the profile by e, s, w and k, what the two levels can explain taken out of them, their
+    `products` (n, p, p) with each other and their `pulls` (n, p): products with what remains.
     """
 
-    height: Array
+    levels: Array
     misfit: Array
     products: Array
     pulls: Array
 
 
-def shape_step(offsets: Array, profile: Profile) -> Array:
-    """Give how the step S of every profile changes with e, s, w and k, and S itself (n, 5, m)."""
-    near = (offsets - profile.edge[:, None]) / profile.blur
-    shown = np.maximum(profile.width, 0.0)[:, None]
-    far, share = near + shown / profile.blur, profile.share[:, None]
-    bell_near, bell_far = (share - 1.0) * _bell(near), share * _bell(far)
-    lift = ndtr(near)
-    step = np.empty((len(near), 5, len(offsets)))
-    step[:, 0] = (bell_near - bell_far) / profile.blur
-    step[:, 1] = (bell_near * near - bell_far * far) / profile.blur
-    step[:, 2] = bell_far * (shown > 0.0) / profile.blur
-    step[:, 3] = ndtr(far) - lift
-    step[:, 4] = lift + share * step[:, 3]
-    return step
+def compare(offsets: Array, grey: Array, profile: Profile, *, slopes: int = 4) -> Comparison:
+    """Compare grey profiles (n, m) with the model, and with its first `slopes` slopes: 1 or all 4.
+
+    Of the signals on a ray only their products with each other are needed; what the levels explain
+    leaves them by elimination (Gauss).
+    """
+    return explain(*_signals(offsets, grey, profile, slopes))
 
 
-def shape_edge(offsets: Array, profile: Profile) -> Array:
-    """Give how the step S changes with e alone, and S (n, 2, m)."""
+def explain(signals: Array, levels: Array) -> Comparison:
+    """Compare the last of the signals on each ray (n, p + k + 1, m) with the first p, the slopes,
+    once the k between them are taken out, whose `levels` (n, k) were fitted.
+    """
+    slopes = signals.shape[1] - levels.shape[1] - 1
+    products = signals @ signals.swapaxes(1, 2)
+    for level in range(slopes, signals.shape[1] - 1):
+        share = products[:, level] / np.maximum(products[:, level, level], 1e-9)[:, None]
+        products -= share[:, :, None] * products[:, None, level]
+    misfit = np.sqrt(np.maximum(products[:, -1, -1], 0.0) / signals.shape[2])
+    return Comparison(levels[:, -2:], misfit, products[:, :slopes, :slopes],
+                      products[:, :slopes, -1])
+
+
+def _signals(offsets: Array, grey: Array, profile: Profile, slopes: int) -> tuple[Array, Array]:
+    """List the slopes, what the levels multiply and the grey (n, p, m), with the levels (n, k)."""
     near = (offsets - profile.edge[:, None]) / profile.blur
     far = near + np.maximum(profile.width, 0.0)[:, None] / profile.blur
-    share = profile.share[:, None]
-    step = np.empty((len(near), 2, len(offsets)))
-    step[:, 0] = ((share - 1.0) * _bell(near) - share * _bell(far)) / profile.blur
-    step[:, 1] = (1.0 - share) * ndtr(near) + share * ndtr(far)
-    return step
+    lift_near, lift_far, shade = ndtr(near), ndtr(far), profile.shade[:, None]
+    wall, like_light = lift_far - lift_near, shade if profile.backlight else 0.0
+    signals = np.empty((len(near), slopes + (4 if profile.sloped else 3), len(offsets)))
+    signals[:, -3], signals[:, -1] = 1.0 - lift_far + like_light * wall, grey
+    signals[:, -2] = lift_near + (1.0 - shade if profile.backlight else shade) * wall
+    if profile.sloped:
+        signals[:, -4] = offsets * (1.0 - lift_far)
+    levels = fit_levels(signals[:, slopes:])
+    behind, sheet = levels[:, -2, None], levels[:, -1, None]
+    taken = behind - sheet if profile.backlight else sheet
+    wall_grey = shade * taken + (sheet if profile.backlight else 0.0)
+    if profile.sloped:
+        behind = behind + levels[:, :1] * offsets
+    bell_near = (wall_grey - sheet) / profile.blur * bell(near)
+    bell_far = (behind - wall_grey) / profile.blur * bell(far)
+    signals[:, 0] = bell_near + bell_far
+    if slopes > 1:
+        signals[:, 1] = bell_near * near + bell_far * far
+        signals[:, 2] = -bell_far * (profile.width > 0.0)[:, None]
+        signals[:, 3] = taken * wall
+    return signals, levels
 
 
-def compare(grey: Array, step: Array) -> Comparison:
-    """Compare profiles (n, m) with a step and its slopes before it (n, p + 1, m).
-
-    Of the signals on a ray only their products with each other are needed; what two levels explain
-    leaves them by taking the means out of the signals, then the step out of the products (an
-    elimination of Gauss).
-    """
-    signals = np.concatenate([step, grey[:, None]], axis=1)
-    signals -= np.einsum("nsm->ns", signals)[..., None] / grey.shape[1]  # short rows: fast so
+def fit_levels(signals: Array) -> Array:
+    """Fit the last signal by the others (n, k + 1, m): how much of each it takes (n, k)."""
     products = signals @ signals.swapaxes(1, 2)
-    share = products[:, -2] / np.maximum(products[:, -2, -2], 1e-9)[:, None]
-    products -= share[:, :, None] * products[:, None, -2]
-    height = share[:, -1]
-    misfit = np.sqrt(np.maximum(products[:, -1, -1], 0.0) / grey.shape[1])
-    return Comparison(height, misfit, products[:, :-2, :-2] * (height**2)[:, None, None],
-                      products[:, :-2, -1] * height[:, None])
+    if signals.shape[1] > 3:
+        square = products[:, :-1, :-1] + 1e-6 * np.eye(signals.shape[1] - 1)
+        return np.asarray(np.linalg.solve(square, products[:, :-1, -1:])[..., 0])
+    (aa, ab, ag), (_, bb, bg), _ = products.transpose(1, 2, 0)  # two by hand: many are needed
+    scale = np.maximum(aa * bb - ab * ab, 1e-9)
+    return np.column_stack([bb * ag - ab * bg, aa * bg - ab * ag]) / scale[:, None]
 
 
-def _bell(x: Array) -> Array:
+def bell(x: Array) -> Array:
+    """Give the density of the normal distribution."""
     return np.asarray(np.exp(-0.5 * x * x) / np.sqrt(2.0 * np.pi))

@@ -1,8 +1,9 @@
 """How much of the bore's wall the camera sees: a thick sheet shows two rims.
 
 The bore's edge on the far face is the near one moved along the normal by the thickness. Where its
-picture falls inside the near rim, a strip of wall lies between the two, brighter than the hole and
-darker than the sheet; an edge finder that knows two levels only is drawn to its far side.
+picture falls inside the near rim, a strip of wall lies between the two: brighter than a dark hole
+and darker than the sheet, so that an edge finder that knows two levels only is drawn to its far
+side; or darker than both, where something behind is lit.
 """
 
 from __future__ import annotations
@@ -15,7 +16,6 @@ from cell.core.geometry import Array
 from cell.core.optics import CameraModel
 from cell.metrology.detect.ellipse import Ellipse, project_circle
 from cell.metrology.detect.find_holes import Hole
-from cell.metrology.detect.profile import Profile
 from cell.metrology.features import Expected
 
 USUAL_THICKNESS = 1.2   # mm
@@ -23,24 +23,26 @@ USUAL_DISTANCE = 250.0  # mm
 SUSPECTED = 3.5         # px, the shift of a far rim that shows without having been predicted
 LITTLE, MUCH = 0.98, 0.85      # of the misfit: evidence for a wall that was expected, or not
 HARDLY, BRIGHTLY = 0.02, 0.25  # share, of the step from hole to sheet, that walls take or do not
+LIKELY_GLOW = 0.4       # of the sheet's grey, beyond which a wall is no less surely dark
 WALL_GREY = 0.08        # of the sheet's: a wall that the light passes along is nearly black
-BROAD, BROAD_DOUBT = 2.0, 0.3  # px of wall, and what share of the rest is doubted
 USUAL_TILT = 0.06       # rad, the standard deviation of a tilt that nothing is known of
 
 
 @dataclass(frozen=True, eq=False)
 class Wall:
     """The far rim against the near one, px: moved by `shift` (2,), each +- `sigma`, and smaller
-    by `shrink`. `share` is what part of the step from hole to sheet the wall takes, `share_sigma`
-    how well that is known; `worth` the share of the misfit that has to remain below for the wall to
-    be believed.
+    by `shrink`. `shade` is the wall's grey as a profile has it, `shade_sigma` how well that is
+    known; `sloped` and `backlight` are those of the profile; `worth` the share of the misfit that
+    has to remain below for the wall to be believed.
     """
 
     shift: Array
     sigma: float
     shrink: float
-    share: float
-    share_sigma: float
+    shade: float
+    shade_sigma: float
+    sloped: bool = False
+    backlight: bool = False
     worth: float = 1.0
 
     @property
@@ -54,11 +56,7 @@ class Wall:
 
 
 def predict_wall(rim: Ellipse, hole: Hole, camera: CameraModel, expected: Expected) -> Wall:
-    """Predict the visible wall from thickness, tilt and distance, as far as they are known.
-
-    Before something lit the wall is a dark ring, too narrow to be seen by itself as a rule. Under
-    an opening brighter than the sheet the wall is as dark as the sheet, or darker.
-    """
+    """Predict the visible wall from thickness, tilt and distance, as far as they are known."""
     ray = camera.rays(rim.centre)
     depth = float(expected.centre[2]) if expected.centre is not None else USUAL_DISTANCE
     thickness = USUAL_THICKNESS if expected.thickness is None else expected.thickness
@@ -67,14 +65,19 @@ def predict_wall(rim: Ellipse, hole: Hole, camera: CameraModel, expected: Expect
     scale = float(camera.matrix[0, 0]) / depth
     near = project_circle(camera, depth * ray, normal, rim.radius / scale)
     far = project_circle(camera, depth * ray - thickness * normal, normal, rim.radius / scale)
-    known = is_known(expected)
-    unsure = expected.normal_sigma if known else USUAL_TILT
-    share, share_sigma = 1.0, BRIGHTLY if known else HARDLY
-    if hole.inside < 0:
-        share = min(0.0, (WALL_GREY - hole.glow) / (1.0 - hole.glow))
-        share_sigma = HARDLY - BRIGHTLY * share
+    unsure = expected.normal_sigma if is_known(expected) else USUAL_TILT
     return Wall(far.centre - near.centre, 0.05 + thickness * unsure * scale,
-                near.radius - far.radius, share, share_sigma)
+                near.radius - far.radius, *_shade(hole, expected), hole.lit, hole.inside > 0)
+
+
+def _shade(hole: Hole, expected: Expected) -> tuple[float, float]:
+    """Say how bright the wall is, and how surely: as the dark that it stands before, or a dark ring
+    before something lit. Before a backlight it is as dark as the sheet.
+    """
+    if hole.inside > 0:
+        return 0.0, BRIGHTLY if is_known(expected) else HARDLY
+    beyond = float(np.clip(hole.glow - WALL_GREY, 0.0, LIKELY_GLOW))
+    return min(WALL_GREY, hole.glow), HARDLY * max(1.0 - hole.glow, 0.0) + BRIGHTLY * beyond
 
 
 def is_known(expected: Expected) -> bool:
@@ -82,20 +85,21 @@ def is_known(expected: Expected) -> bool:
     return expected.thickness is not None and expected.normal is not None
 
 
-def doubt_of_wall(wall: Wall, profile: Profile) -> float:
-    """Say how far (px) a wall may have drawn the rim where nobody could predict its width."""
-    broad = max(float(profile.width.max()) - BROAD, 0.0)
-    return abs(wall.share) * wall.sigma + BROAD_DOUBT * broad
-
-
-def lit(wall: Wall) -> Wall:
+def lit(wall: Wall, hole: Hole) -> Wall:
     """Let the wall be as bright as it may; before something lit, a dark one is far likelier."""
-    return replace(wall, share=max(wall.share, BRIGHTLY), share_sigma=BRIGHTLY,
-                   worth=MUCH if wall.share < -BRIGHTLY / 2.0 else LITTLE)
+    if hole.inside > 0:
+        return replace(wall, shade_sigma=BRIGHTLY, worth=LITTLE)
+    between = min(hole.glow + BRIGHTLY * (1.0 - hole.glow), 1.0)
+    sigma = BRIGHTLY * max(1.0 - hole.glow, LIKELY_GLOW)
+    return replace(wall, shade=max(wall.shade, between), shade_sigma=sigma,
+                   worth=MUCH if wall.shade + BRIGHTLY / 2.0 < min(hole.glow, 1.0) else LITTLE)
 
 
 def suspect_walls(predicted: Wall) -> list[Wall]:
-    """List walls on all sides, for a rim that shows two edges where nothing was predicted."""
+    """List walls on all sides, for a rim that shows two edges where nothing was predicted: lit ones
+    before something dark, and dark ones before something lit.
+    """
     turn = np.arange(8) * np.pi / 4.0
-    return [Wall(SUSPECTED * np.array([np.cos(t), np.sin(t)]), SUSPECTED / 2.0, predicted.shrink,
-                 0.5, BRIGHTLY, worth=MUCH) for t in turn]
+    one = predicted if predicted.sloped else replace(predicted, shade=0.5, shade_sigma=BRIGHTLY)
+    return [replace(one, shift=SUSPECTED * np.array([np.cos(t), np.sin(t)]),
+                    sigma=SUSPECTED / 2.0, worth=MUCH) for t in turn]
