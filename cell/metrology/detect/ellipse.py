@@ -82,8 +82,12 @@ class Ellipse:
 
     def reach(self, points: ArrayLike) -> Array:
         """Measure where points (n, 2) lie: below 1 inside, 1 on the ellipse, above 1 outside."""
-        inward = (np.asarray(points, dtype=np.float64) - self.centre) @ np.linalg.inv(self.shape)
-        return np.linalg.norm(inward, axis=-1)
+        return np.linalg.norm(self.inward(points), axis=-1)
+
+    def inward(self, points: ArrayLike) -> Array:
+        """Carry points (n, 2) to where the ellipse is the unit circle: (cos t, sin t) on it."""
+        away = np.asarray(points, dtype=np.float64) - self.centre
+        return np.asarray(away @ np.linalg.inv(self.shape))
 
 
 def project_circle(camera: CameraModel, centre: Array, normal: Array, radius: float) -> Ellipse:

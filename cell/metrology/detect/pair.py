@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -10,12 +11,13 @@ import numpy as np
 from cell.core.errors import UnmeasurableError
 from cell.core.observation import Image
 from cell.core.optics import CameraModel, SensorModel
-from cell.metrology.detect.find_holes import Hole, find_holes
+from cell.metrology.detect.find_holes import LIT, Hole, find_holes
 from cell.metrology.detect.gates import COMPLETE, check_lit, is_white, why_no_hole
 from cell.metrology.detect.hole import detect_rim
+from cell.metrology.detect.lit_rim import find_lit_rim
 from cell.metrology.detect.opening import LEAST_GAP, name_opening
 from cell.metrology.detect.ridge import Ridge, find_ridges, ground_along, runs_upright, shows_in
-from cell.metrology.detect.stripe import crosses, falls_into, follow_stripe
+from cell.metrology.detect.stripe import crosses, ends_at, falls_into, follow_stripe, gaps, outline
 from cell.metrology.features import Expected, Rim, Stripe
 from cell.metrology.reasons import Reason, refusal
 from cell.metrology.spread import middle
@@ -23,6 +25,9 @@ from cell.metrology.spread import middle
 DOUBTFUL = ("slot", "half_occluded", "not_round", "hole_cut_by_border", "too_dark")
 FAINT = 0.2       # of the contrast of another hole in the same picture
 CLEAR, ALIKE = 3.0, 0.4  # times its ground: no scratch; of that in one image, in the other
+STRAIGHT_AGAIN = 12.0  # px beside a rim, die roll included
+SURE, MOST = 0.9, 2  # coverage, beyond which nothing is missing; gaps of the stripe
+ALIKE_SIZE = 0.1  # of a radius
 ANYWHERE = 100.0  # mm, the standard deviation of where a hole may be in the picture
 
 
@@ -41,8 +46,7 @@ def detect_pair(hole_image: Image, stripe_image: Image, sensor: SensorModel,
     if not ridges:
         raise refusal("no_laser")
     check_lit(hole_image)
-    ridge, hole, placed = _choose(ridges, hole_image, sensor, expected)
-    rim = _detect_rim(hole_image, hole, ridge, sensor.camera, placed)
+    ridge, rim = _choose(ridges, hole_image, sensor, expected)
     return rim, follow_stripe(stripe_image, ridge, rim, sensor, expected)
 
 
@@ -62,20 +66,38 @@ def _detect_rim(image: Image, hole: Hole, ridge: Ridge, camera: CameraModel,
 
 
 def _choose(ridges: list[Ridge], image: Image, sensor: SensorModel,
-            expected: Expected) -> tuple[Ridge, Hole, Expected]:
-    """Choose the stripe on the sheet, and the hole that it crosses; tell its depth as well."""
+            expected: Expected) -> tuple[Ridge, Rim]:
+    """Choose the stripe on the sheet, and the hole that it crosses, and locate its rim."""
     reasons: list[Reason] = []
     for ridge in ridges:
         placed = _at_depth(expected, ridge, sensor)
         hole, beside = _crossed(find_holes(image, sensor.camera, placed), ridge)
+        if hole is None or hole.inside > 0 or (hole.coverage < SURE and hole.glow > LIT):
+            lit = _before_something_lit(image, ridge, sensor.camera, placed)
+            if lit is not None:
+                return ridge, lit
         if hole is not None:
             if hole.coverage < COMPLETE:
                 _check_radius(ridge, image, sensor, expected)
-            return ridge, hole, placed
+            return ridge, _detect_rim(image, hole, ridge, sensor.camera, placed)
         hidden = is_white(image) and ridge.gone.sum() >= LEAST_GAP
         reasons.append("laser_misses_hole" if beside and not hidden else why_no_hole(image, ridge))
     _check_radius(ridges[0], image, sensor, expected)
     raise refusal(reasons[0])
+
+
+def _before_something_lit(image: Image, ridge: Ridge, camera: CameraModel,
+                          expected: Expected) -> Rim | None:
+    """Locate a rim where the stripe leaves the sheet and comes back; None where none is clear."""
+    for ends in gaps(ridge, LEAST_GAP)[:MOST]:
+        hole = find_lit_rim(image, ends, camera, expected)
+        if hole is not None:
+            with suppress(UnmeasurableError):
+                rim = detect_rim(image, hole, camera, expected)
+                ellipse = outline(rim)
+                if np.abs(ellipse.reach(ends) - 1.0).max() * ellipse.radius < STRAIGHT_AGAIN:
+                    return rim
+    return None
 
 
 def _check_radius(ridge: Ridge, image: Image, sensor: SensorModel, expected: Expected) -> None:
@@ -86,6 +108,8 @@ def _check_radius(ridge: Ridge, image: Image, sensor: SensorModel, expected: Exp
     hole, _ = _crossed(find_holes(image, sensor.camera, placed), ridge)
     if hole is not None and hole.coverage > COMPLETE and placed.centre is not None:
         radius = hole.ellipse.radius * placed.centre[2] / sensor.camera.matrix[0, 0]
+        if abs(radius - expected.radius) < ALIKE_SIZE * expected.radius:
+            return
         raise refusal("radius_against_nominal",
                       f"about {radius:.1f} mm instead of {expected.radius:.1f}")
 
@@ -121,7 +145,8 @@ def _crossed(holes: Iterable[Hole], ridge: Ridge) -> tuple[Hole | None, bool]:
         whole = hole.coverage > COMPLETE
         if not crosses(ridge, hole.ellipse):
             strongest = max(strongest, hole.contrast if whole else 0.0)
-        elif hole.contrast < FAINT * strongest or not falls_into(ridge, hole.ellipse):
+        elif (hole.contrast < FAINT * strongest or not falls_into(ridge, hole.ellipse)
+              or not ends_at(ridge, hole.ellipse, STRAIGHT_AGAIN, both=hole.inside > 0)):
             continue
         elif whole:
             return hole, True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -32,13 +33,40 @@ def agree(band: Band, edges: Edges, tolerance: float, *, free: int = 5) -> tuple
     Returns:
         The ellipse, and which edges agree (k,).
     """
-    design = _design(band, free)
-    rows = design[edges.ray]
+    rows = _design(band, free)[edges.ray]
     picks = _draws(edges.ray, len(band.t), free)
     solved = _solve(rows[picks], edges.offset[picks])
+    winner, miss = _best(solved, rows, edges, tolerance)
+    return _moved(band.ellipse, winner, free), np.abs(miss) < tolerance
+
+
+def agree_between(band: Band, edges: Edges, tolerance: float, ends: Array,
+                  slack: float) -> tuple[Ellipse, Array]:
+    """Find the ellipse of the band's shape that most edges agree with, of those that pass two
+    `ends` (2, 2) px within some `slack`: one edge decides each draw.
+
+    Returns:
+        The ellipse, and how far from it each edge lies (k,) px.
+    """
+    design = _design(band, 3)
+    toward = band.ellipse.inward(ends)
+    at = replace(band, t=np.arctan2(toward[:, 1], toward[:, 0]))
+    offset = ((ends - band.ellipse.points(at.t)) * at.normals).sum(axis=1)
+    draw, rows = np.arange(DRAWS), design[edges.ray]
+    pick = np.floor(len(rows) * np.mod(draw * GOLDEN, 1.0)).astype(np.intp)
+    unsure = slack * (2.0 * np.mod(draw[:, None] * np.sqrt([2.0, 5.0]), 1.0) - 1.0)
+    met = np.broadcast_to(_design(at, 3), (DRAWS, 2, 3))
+    solved = _solve(np.concatenate([met, rows[pick, None]], axis=1),
+                    np.column_stack([offset + unsure, edges.offset[pick]]))
+    winner, miss = _best(solved, rows, edges, tolerance)
+    return _moved(band.ellipse, winner, 3), miss
+
+
+def _best(solved: Array, rows: Array, edges: Edges, tolerance: float) -> tuple[Array, Array]:
+    """Choose the draw that most edges agree with, and tell how far (k,) px each is from it."""
     miss = np.minimum((solved @ rows.T - edges.offset) ** 2, tolerance**2)
     winner = solved[int(np.argmin(miss.sum(axis=1)))]
-    return _moved(band.ellipse, winner, free), np.abs(rows @ winner - edges.offset) < tolerance
+    return winner, rows @ winner - edges.offset
 
 
 def settle(band: Band, edges: Edges, *, floor: float,

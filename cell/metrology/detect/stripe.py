@@ -8,7 +8,7 @@ from cell.core.geometry import Array, Plane
 from cell.core.observation import Image
 from cell.core.optics import CameraModel, SensorModel
 from cell.metrology.detect.ellipse import Ellipse
-from cell.metrology.detect.ridge import Ridge, find_ridges, runs_upright
+from cell.metrology.detect.ridge import BIN, Ridge, find_ridges, runs_upright
 from cell.metrology.detect.stripe_centres import HALF_WINDOW, centre_stripe
 from cell.metrology.features import Expected, Rim, Stripe
 from cell.metrology.reasons import refusal
@@ -18,6 +18,7 @@ DIE_ROLL = 0.7      # mm beside the rim, where a sheet of unknown thickness bend
 LENGTH = 12.0       # mm of stripe used on either side: the sheet is flat as far as that
 LARGEST_GAP = 0.4   # px between the two sides, beyond what their noise allows
 LEAST_LINES = 8     # on either side
+HALF = 0.5          # of its usual height, at which a stripe ends
 DEEP = 0.95         # of the radius, from which on a stripe counts as inside
 LEAST_GAP = 0.3     # of the chord, on which the stripe has to be gone
 
@@ -32,7 +33,7 @@ def detect_stripe(image: Image, rim: Rim, camera: CameraModel, light_plane: Plan
     ridges = find_ridges(image, upright=runs_upright(light_plane))
     if not ridges:
         raise refusal("no_laser")
-    hole = _hole(rim)
+    hole = outline(rim)
     ridge = next((ridge for ridge in ridges if falls_into(ridge, hole)), ridges[0])
     return follow_stripe(image, ridge, rim, SensorModel(camera, light_plane), expected)
 
@@ -40,7 +41,7 @@ def detect_stripe(image: Image, rim: Rim, camera: CameraModel, light_plane: Plan
 def follow_stripe(image: Image, ridge: Ridge, rim: Rim, sensor: SensorModel,
                   expected: Expected) -> Stripe:
     """Locate a stripe that was found as a whole, line by line."""
-    hole = _hole(rim)
+    hole = outline(rim)
     v, side = _lines_beside(image, ridge, hole, _reaches(ridge, hole, sensor, expected))
     _check_length(side)
     u, height = centre_stripe(image, ridge, v)
@@ -94,7 +95,32 @@ def falls_into(ridge: Ridge, hole: Ellipse) -> bool:
     return bool(inside.any()) and float(ridge.gone[inside].mean()) > LEAST_GAP
 
 
-def _hole(rim: Rim) -> Ellipse:
+def ends_at(ridge: Ridge, hole: Ellipse, reach: float, *, both: bool = False) -> bool:
+    """Tell whether the stripe is back on the sheet within `reach` px of an ellipse that it crosses,
+    at one end at least or at `both`: beside a spot on something behind the hole, it is not.
+    """
+    v = np.flatnonzero(hole.reach(ridge.points(ridge.length)) < 1.0)
+    span, there = int(reach), ~ridge.gone
+    if not len(v):
+        return False
+    ends = there[max(v[0] - span, 0):v[0] + 1].any(), there[v[-1]:v[-1] + span + 1].any()
+    return all(ends) if both else any(ends)
+
+
+def gaps(ridge: Ridge, least: int) -> list[Array]:
+    """List where a stripe leaves the sheet and comes back: pixels (2, 2), the longest gap first."""
+    high = ridge.strength - HALF
+    turns = np.flatnonzero(np.diff(np.signbit(high)))
+    v = BIN * (turns + high[turns] / (high[turns] - high[turns + 1]) + 0.5) - 0.5
+    falls = np.flatnonzero(high[turns] >= 0.0)  # the stripe leaves there
+    ends = [v[fall:fall + 2] for fall in falls if fall + 1 < len(v)]
+    long = [pair for pair in ends if pair[1] - pair[0] >= least]
+    long.sort(key=lambda pair: float(pair[0] - pair[1]))
+    return [ridge.pixels(ridge.across(pair), pair) for pair in long]
+
+
+def outline(rim: Rim) -> Ellipse:
+    """Give the ellipse of a rim."""
     x, y, major, minor, angle = rim.ellipse
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     return Ellipse(np.array([x, y]), turn @ np.diag([major, minor]) @ turn.T)
