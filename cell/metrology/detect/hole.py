@@ -200,9 +200,9 @@ def _drawn(band: Band, profile: Profile, width_sigma: float) -> tuple[Array, flo
     square = np.maximum(seen.products[:, 0, 0], 1e-9)
     by_width, by_shade = seen.products[:, 0, 2] / square, seen.products[:, 0, 3] / square
     glow = seen.levels[:, 0] / np.maximum(seen.levels[:, 1], 1e-3)
-    other = np.ones_like(glow) if profile.backlight else glow  # the shade of what is behind
-    between = profile.backlight | ((profile.shade - glow) * (1.0 - glow) > 0.0)
-    doubt = np.where(between, LIT_DOUBT, DARK_DOUBT) * np.abs(profile.shade - other)
+    behind = 1.0 if profile.backlight else glow if profile.sloped else 0.0  # as a wall's shade
+    between = profile.backlight | ((profile.shade - behind) * (1.0 - glow) > 0.0)
+    doubt = np.where(between, LIT_DOUBT, DARK_DOUBT) * np.abs(profile.shade - behind)
     broad = max(float(profile.width.max()) - BROAD, 0.0) if width_sigma else 0.0
     return (np.minimum(np.abs(by_shade) * doubt, np.maximum(profile.width, 0.0)),
             float(np.abs(by_width).mean()) * width_sigma + BROAD_DOUBT * broad)

@@ -3,9 +3,10 @@
 Along each ray the grey is  h (1 - F(far)) + p (F(near) + k (F(far) - F(near)))  with
 near = (d - e) / s  and  far = (d - e + w) / s :  F is the normal distribution, h the grey behind
 the hole, p the sheet's, k the wall's as a share of the sheet's, e where the sheet ends, w how wide
-the wall shows, s the blur. Behind may be as bright as the sheet: the wall is then a dark ring
-between the two, and the only edge there is. The sheet throws a soft shadow on what is lit behind
-it, so that h may fall toward the rim: h + h' d.
+the wall shows, s the blur. Before the dark the wall is as dark, and k what it has beyond that.
+Behind may be as bright as the sheet: the wall is then a dark ring between the two, and the only
+edge there is. The sheet throws a soft shadow on what is lit behind it, so that h may fall toward
+the rim: h + h' d.
 """
 
 from __future__ import annotations
@@ -23,9 +24,10 @@ from cell.metrology.arrays import Indices
 class Profile:
     """What the profiles of a rim share: the `blur` px; and on each ray where the sheet ends
     (`edge`, (n,) px along the normal), how wide the wall shows (`width`) and its `shade`: its grey
-    as a share of the sheet's; or, before a `backlight` that is much brighter than the sheet, how
-    much of the light it takes: its grey between the sheet's (0) and the light's (1). `sloped` lets
-    the grey behind change along a ray, as the shadow of the sheet on something lit does.
+    as a share of the sheet's, beyond the dark behind it; or, before a `backlight` that is much
+    brighter than the sheet, how much of the light it takes: its grey between the sheet's (0) and
+    the light's (1). `sloped` says that something lit lies behind: the wall's grey is its own, and
+    that behind may change along a ray, as the shadow of the sheet does.
     """
 
     edge: Array
@@ -82,7 +84,8 @@ def _signals(offsets: Array, grey: Array, profile: Profile, slopes: int) -> tupl
     near = (offsets - profile.edge[:, None]) / profile.blur
     far = near + np.maximum(profile.width, 0.0)[:, None] / profile.blur
     lift_near, lift_far, shade = ndtr(near), ndtr(far), profile.shade[:, None]
-    wall, like_light = lift_far - lift_near, shade if profile.backlight else 0.0
+    wall = lift_far - lift_near
+    like_light = shade if profile.backlight else 0.0 if profile.sloped else 1.0
     signals = np.empty((len(near), slopes + (4 if profile.sloped else 3), len(offsets)))
     signals[:, -3], signals[:, -1] = 1.0 - lift_far + like_light * wall, grey
     signals[:, -2] = lift_near + (1.0 - shade if profile.backlight else shade) * wall
@@ -91,7 +94,7 @@ def _signals(offsets: Array, grey: Array, profile: Profile, slopes: int) -> tupl
     levels = fit_levels(signals[:, slopes:])
     behind, sheet = levels[:, -2, None], levels[:, -1, None]
     taken = behind - sheet if profile.backlight else sheet
-    wall_grey = shade * taken + (sheet if profile.backlight else 0.0)
+    wall_grey = shade * taken + (sheet if profile.backlight else like_light * behind)
     if profile.sloped:
         behind = behind + levels[:, :1] * offsets
     bell_near = (wall_grey - sheet) / profile.blur * bell(near)

@@ -77,7 +77,13 @@ def _shade(hole: Hole, expected: Expected) -> tuple[float, float]:
     if hole.inside > 0:
         return 0.0, BRIGHTLY if is_known(expected) else HARDLY
     beyond = float(np.clip(hole.glow - WALL_GREY, 0.0, LIKELY_GLOW))
-    return min(WALL_GREY, hole.glow), HARDLY * max(1.0 - hole.glow, 0.0) + BRIGHTLY * beyond
+    return (min(WALL_GREY, hole.glow) - _dark(hole),
+            HARDLY * max(1.0 - hole.glow, 0.0) + BRIGHTLY * beyond)
+
+
+def _dark(hole: Hole) -> float:
+    """Give the shade of the dark behind a hole, which a profile counts a wall's shade from."""
+    return 0.0 if hole.lit else hole.glow
 
 
 def is_known(expected: Expected) -> bool:
@@ -89,10 +95,11 @@ def lit(wall: Wall, hole: Hole) -> Wall:
     """Let the wall be as bright as it may; before something lit, a dark one is far likelier."""
     if hole.inside > 0:
         return replace(wall, shade_sigma=BRIGHTLY, worth=LITTLE)
-    between = min(hole.glow + BRIGHTLY * (1.0 - hole.glow), 1.0)
+    between = min(hole.glow + BRIGHTLY * (1.0 - hole.glow), 1.0) - _dark(hole)
     sigma = BRIGHTLY * max(1.0 - hole.glow, LIKELY_GLOW)
     return replace(wall, shade=max(wall.shade, between), shade_sigma=sigma,
-                   worth=MUCH if wall.shade + BRIGHTLY / 2.0 < min(hole.glow, 1.0) else LITTLE)
+                   worth=MUCH if wall.shade + _dark(hole) + BRIGHTLY / 2.0 < min(hole.glow, 1.0)
+                   else LITTLE)
 
 
 def suspect_walls(predicted: Wall) -> list[Wall]:

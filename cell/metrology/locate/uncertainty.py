@@ -34,7 +34,7 @@ Budget: TypeAlias = dict[str, Array]
 """Covariances (4, 4) of x, y, z and the radius by source, mm²; sources are independent."""
 
 FORM_SIGMA = 0.004  # mm, each wave of the rim: what punched and drilled holes show
-CENTRE_DOUBT, RADIUS_DOUBT = 0.017, 0.06  # px: what light and edge break do to a clean rim
+CENTRE_DOUBT, RADIUS_DOUBT = 0.015, 0.06  # px: what light and edge break do to a clean rim
 AMBIGUITY, SHARE = (0.3, 0.8), (0.08, 0.35)  # px, and the share of it that moves a centre
 COMPLETE, HIDING = 0.8, 1.5  # of a rim are seen; px by which each share that is missing may mislead
 SHOWN = [0, 1, 2, RADIUS]
