@@ -31,7 +31,7 @@ from cell.metrology.detect.gates import (
     clipped,
 )
 from cell.metrology.detect.profile import Profile, compare
-from cell.metrology.detect.profile_fit import fit_profile, locate_edges, uneven_blur
+from cell.metrology.detect.profile_fit import NARROWEST, fit_profile, locate_edges, uneven_blur
 from cell.metrology.detect.rim_fit import agree, settle
 from cell.metrology.detect.wall import Wall, is_known, lit, predict_wall, suspect_walls
 from cell.metrology.features import Expected, Rim
@@ -91,7 +91,8 @@ def detect_rim(image: Image, hole: Hole, camera: CameraModel, expected: Expected
         walls += suspect_walls(walls[0])
     elif doubled or walls[0].widest > NOTICED:
         walls.append(lit(walls[0], hole))
-    band, rays, profile = _fit(hole, rough, seen, walls, doubled or hole.inside >= 0)
+    band, rays, profile = _fit(hole, rough, seen, walls, doubled or hole.inside >= 0,
+                               _sharpest(camera))
     edge, unsure, misfit = locate_edges(band, profile)
     unrest = middle(misfit[rays])
     check_clear(middle(unsure[rays]), profile.blur)
@@ -119,7 +120,7 @@ def _rough_rim(hole: Hole) -> tuple[Ellipse, Mask, bool]:
 
 
 def _fit(hole: Hole, rough: Ellipse, seen: Mask, walls: list[Wall],
-         doubled: bool) -> tuple[Band, Mask, Profile]:
+         doubled: bool, sharpest: float) -> tuple[Band, Mask, Profile]:
     """Fit the grey profiles around a rough rim; where either sense was followed, which shows other
     edges than the rim, around what was fitted again until the rim lies amid its profiles. Returns
     them and which of them were used as well.
@@ -127,15 +128,20 @@ def _fit(hole: Hole, rough: Ellipse, seen: Mask, walls: list[Wall],
     widest, more = max(wall.widest for wall in walls), BEHIND if hole.lit else 0.0
     band = _profiles(hole.patch, rough, widest, more)
     rays = np.repeat(seen, -(-len(band.t) // len(seen)))[:len(band.t)]
-    profile = fit_profile(band, rays, walls, doubled=doubled)
+    profile = fit_profile(band, rays, walls, doubled=doubled, sharpest=sharpest)
     for _ in range(0 if hole.inside else AGAIN):
         if np.abs(profile.edge).max() < AMID:
             break
         move = np.asarray(np.linalg.lstsq(band.design, profile.edge, rcond=None)[0])
         band = _profiles(hole.patch, band.ellipse.moved(move), widest, more)
         rays = np.ones(len(band.t), dtype=bool)
-        profile = fit_profile(band, rays, walls, doubled=doubled)
+        profile = fit_profile(band, rays, walls, doubled=doubled, sharpest=sharpest)
     return band, rays, profile
+
+
+def _sharpest(camera: CameraModel) -> float:
+    """Say how soft even a sharp rim is in a smoothed picture, px: sharper, a fit is wrong."""
+    return NARROWEST if camera.blur is None else float(np.hypot(camera.blur / ALIKE, SMOOTHING))
 
 
 def _profiles(patch: Patch, rim: Ellipse, wall_width: float, more: float) -> Band:

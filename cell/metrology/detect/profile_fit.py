@@ -33,8 +33,8 @@ PIXELS_PER_ERROR = 60.0  # texture and smoothing: so many pixels go wrong togeth
 class RimModel:
     """The eleven numbers of a rim: ellipse 5, blur, shift of the far rim 2, wall's shade 3."""
 
-    def __init__(self, band: Band, wall: Wall) -> None:
-        self.wall = wall
+    def __init__(self, band: Band, wall: Wall, sharpest: float) -> None:
+        self.wall, self.sharpest = wall, sharpest
         self.design, self.normals = band.design, band.normals
         self.around = np.column_stack([np.ones_like(band.t), np.cos(band.t), np.sin(band.t)])
         self.prior = np.array([0.0] * 5 + [USUAL_BLUR, *wall.shift, wall.shade, 0.0, 0.0])
@@ -43,7 +43,7 @@ class RimModel:
 
     def read(self, x: Array) -> Profile:
         """Turn the eleven numbers into what each ray shows."""
-        return Profile(self.design @ x[:5], float(np.clip(x[5], NARROWEST, WIDEST)),
+        return Profile(self.design @ x[:5], float(np.clip(x[5], self.sharpest, WIDEST)),
                        self.wall.shrink - self.normals @ x[6:8],
                        np.clip(self.around @ x[8:], DARKEST, BRIGHTEST),
                        self.wall.sloped, self.wall.backlight)
@@ -63,7 +63,8 @@ class RimModel:
         return move
 
 
-def fit_profile(band: Band, rays: Mask, walls: list[Wall], *, doubled: bool = True) -> Profile:
+def fit_profile(band: Band, rays: Mask, walls: list[Wall], *, doubled: bool = True,
+                sharpest: float = NARROWEST) -> Profile:
     """Fit ellipse, blur and wall together to the pixels of the `rays` (n,) that agree.
 
     Where a wall of some width is to be expected, the band's ellipse may lie on its far side: the
@@ -75,13 +76,14 @@ def fit_profile(band: Band, rays: Mask, walls: list[Wall], *, doubled: bool = Tr
         rays: which of them to use.
         walls: what the wall may be; the first is preferred.
         doubled: whether two rims may show.
+        sharpest: the least blur that the lens leaves any edge, px.
     """
     used = np.flatnonzero(rays)
     few = band[used[::1 + len(used) // FEW]]
     best, least, chosen = np.zeros(11), np.inf, walls[0]
     by_shade = len(walls) == 2  # one wall, dark or lit
     for wall in walls:
-        model = RimModel(few, wall)
+        model = RimModel(few, wall, sharpest)
         starts = [model.prior]
         if doubled and wall.widest > NOTABLE_WALL:
             starts.append(model.prior + model.onto_near_rim())
@@ -94,8 +96,8 @@ def fit_profile(band: Band, rays: Mask, walls: list[Wall], *, doubled: bool = Tr
             if misfit < wall.worth * least:
                 best, least, chosen = state, misfit, wall
     thinned = band[used[::THINNED]]
-    best, _ = _descend(RimModel(thinned, chosen), thinned, best)
-    return RimModel(band, chosen).read(best)
+    best, _ = _descend(RimModel(thinned, chosen, sharpest), thinned, best)
+    return RimModel(band, chosen, sharpest).read(best)
 
 
 def _descend(model: RimModel, band: Band, state: Array) -> tuple[Array, float]:

@@ -200,6 +200,14 @@ def test_an_edge_is_ambiguous_where_it_is_softer_than_the_lens():
     assert soft_lens < 0.1 < 0.5 < min(nobody_knows, sharp_lens)
 
 
+def test_no_rim_is_sharper_than_the_lens_leaves_an_edge():
+    scene = Scene(noise=2.0, blur=0.7)
+    image, camera = scene.hole_image(), scene.sensor.camera
+    free, held = (detect_hole(image, replace(camera, blur=blur), scene.expected()).blur
+                  for blur in (None, 1.6))
+    assert free < 1.2 < 1.7 < held
+
+
 @pytest.mark.parametrize("waves", [3, 4])
 def test_waves_that_go_round_the_rim_are_form_and_no_noise(waves):
     plain, wavy = Scene(noise=2.0), Scene(noise=2.0, waves={waves: 0.02})
